@@ -1,0 +1,1 @@
+//! [`Toolpath`](crate::toolpath::Toolpath) -> text by dialect.

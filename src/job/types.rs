@@ -1,0 +1,394 @@
+//! What a checked job is made of. Every value here is in range; lengths are mm, speeds mm/min.
+
+use crate::geom::{Bounds, DVec2, DVec3, Tolerance};
+
+/// A complete, checked job: all that the stages after the artwork need to know.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Job {
+    /// Name for headers and reports.
+    pub title: String,
+    /// The router.
+    pub machine: Machine,
+    /// The wood on it.
+    pub stock: Stock,
+    /// Where the artwork comes from and where it lies.
+    pub artwork: ArtworkSpec,
+    /// The heightfield and its background.
+    pub relief: ReliefSpec,
+    /// The layers, bottom to top; never empty.
+    pub layers: Vec<LayerSpec>,
+    /// The operations in the order of work; never empty.
+    pub operations: Vec<Operation>,
+    /// The small numbers that the user owns.
+    pub tolerance: Tolerance,
+    /// Height of rapid travel above the stock's top, mm.
+    pub safe_z_mm: f64,
+    /// Gap kept above the wood where a rapid down ends and a feed begins, mm.
+    pub clearance_mm: f64,
+    /// Steepest angle of an entry into wood, radians.
+    pub ramp_rad: f64,
+    /// When true, leftover above scallop + gouge where a cutter reaches fails the proof.
+    pub strict: bool,
+}
+
+/// The router: what it can do, as its GRBL settings say.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Machine {
+    /// Name in job files (`shapeoko3`).
+    pub name: String,
+    /// Name for people.
+    pub title: String,
+    /// Travel of X, Y, Z ($130-$132), mm.
+    pub travel_mm: DVec3,
+    /// Highest speed of each axis ($110-$112), mm/min.
+    pub max_rate_mm_per_min: DVec3,
+    /// Acceleration of each axis ($120-$122), mm/s^2.
+    pub acceleration_mm_per_s2: DVec3,
+    /// Junction deviation ($11), mm.
+    pub junction_deviation_mm: f64,
+    /// Arc tolerance ($12), mm.
+    pub arc_tolerance_mm: f64,
+    /// Slowest spindle speed, 1/min.
+    pub spindle_min_rpm: f64,
+    /// Fastest spindle speed, 1/min.
+    pub spindle_max_rpm: f64,
+    /// Wait after the spindle is switched on, s.
+    pub spindle_dwell_s: f64,
+}
+
+/// The blank. X/Y zero lies at `origin`, Z zero on its top.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Stock {
+    /// Size along x, mm.
+    pub width_mm: f64,
+    /// Size along y, mm.
+    pub height_mm: f64,
+    /// Size along z, mm.
+    pub thickness_mm: f64,
+    /// What it is made of.
+    pub wood: Wood,
+    /// Direction of the grain from the x axis, radians.
+    pub grain_rad: f64,
+    /// Where X/Y zero lies on it.
+    pub origin: Origin,
+}
+
+impl Stock {
+    /// The blank's rectangle in work coordinates, mm.
+    pub fn bounds(&self) -> Bounds {
+        let size = DVec2::new(self.width_mm, self.height_mm);
+        let min = -size * self.origin.fraction();
+        Bounds::new(min, min + size)
+    }
+}
+
+/// Where X/Y zero lies on the stock.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Origin {
+    /// Lower left corner (default).
+    LowerLeft,
+    /// Lower right corner.
+    LowerRight,
+    /// Upper left corner.
+    UpperLeft,
+    /// Upper right corner.
+    UpperRight,
+    /// The middle.
+    Center,
+}
+
+impl Origin {
+    /// Position of the zero as a fraction of the stock's width and height.
+    pub fn fraction(self) -> DVec2 {
+        match self {
+            Self::LowerLeft => DVec2::ZERO,
+            Self::LowerRight => DVec2::X,
+            Self::UpperLeft => DVec2::Y,
+            Self::UpperRight => DVec2::ONE,
+            Self::Center => DVec2::splat(0.5),
+        }
+    }
+}
+
+/// A kind of wood: what it lets a cutter do.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Wood {
+    /// Name in job files (`beech`).
+    pub name: String,
+    /// Name for people.
+    pub title: String,
+    /// (diameter mm, chip load mm/tooth) of flat cutters, rising diameters; interpolated between.
+    pub flat_chip_load_mm: Vec<(f64, f64)>,
+    /// The same for ball cutters in finishing.
+    pub ball_chip_load_mm: Vec<(f64, f64)>,
+    /// Depth of a roughing level as a fraction of the cutter's diameter.
+    pub stepdown_per_diameter: f64,
+}
+
+/// Where the artwork comes from and where it lies.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct ArtworkSpec {
+    /// File name as written in the job (or given on the command line).
+    pub file: String,
+    /// How its size is found.
+    pub fit: Fit,
+    /// Where its bounding box lies on the stock.
+    pub at: Place,
+    /// Folders with fonts for text; empty = the system's.
+    pub font_dirs: Vec<String>,
+}
+
+/// How the size of the artwork is found. Sizes are those of the bounding box of its shapes.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Fit {
+    /// The file's own physical units; artwork in pixels gets the default size, said aloud.
+    Own,
+    /// This width, mm.
+    Width(f64),
+    /// This height, mm.
+    Height(f64),
+    /// As large as fits into this width and height, mm.
+    Box(f64, f64),
+    /// The file's own size (96 px an inch) times this.
+    Scale(f64),
+}
+
+/// Where the artwork's bounding box lies on the stock.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Place {
+    /// In the middle.
+    Center,
+    /// Lower left corner of the bounding box at this point, in work coordinates, mm.
+    LowerLeft(DVec2),
+}
+
+/// The heightfield and its background plane.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct ReliefSpec {
+    /// Distance of the heightfield's nodes, mm.
+    pub pitch_mm: f64,
+    /// How far below the stock's top the background plane lies, mm.
+    pub depth_mm: f64,
+    /// What happens outside the artwork.
+    pub background: Background,
+}
+
+/// What happens to the stock outside the artwork.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Background {
+    /// Cleared down to the background plane, to the stock's edge.
+    Clear,
+    /// As `Clear`, but a frame of this width along the stock's edge stays at the stock's top, mm.
+    Frame(f64),
+    /// Cleared only within this distance of the artwork; the stock's top stays beyond it, mm.
+    Leave(f64),
+}
+
+/// An 8-bit sRGB colour.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, serde::Serialize)]
+pub struct Rgb(pub u8, pub u8, pub u8);
+
+impl std::fmt::Display for Rgb {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "#{:02x}{:02x}{:02x}", self.0, self.1, self.2)
+    }
+}
+
+/// Which shapes of the artwork belong to a layer.
+#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Selector {
+    /// Everything.
+    All,
+    /// Fills of this colour.
+    Fill(Rgb),
+    /// Strokes of this colour.
+    Stroke(Rgb),
+    /// Shapes that carry, or lie in a group that carries, this Inkscape label.
+    Label(String),
+    /// The shape with this id, or the shapes in the group with it.
+    Id(String),
+    /// Shapes in the Inkscape layer (`groupmode = layer`) with this label.
+    Layer(String),
+}
+
+impl std::fmt::Display for Selector {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::All => f.write_str("all"),
+            Self::Fill(c) => write!(f, "fill:{c}"),
+            Self::Stroke(c) => write!(f, "stroke:{c}"),
+            Self::Label(s) => write!(f, "label:{s}"),
+            Self::Id(s) => write!(f, "id:{s}"),
+            Self::Layer(s) => write!(f, "layer:{s}"),
+        }
+    }
+}
+
+/// One layer of the relief.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct LayerSpec {
+    /// Name for messages and reports.
+    pub name: String,
+    /// Which shapes it takes.
+    pub select: Selector,
+    /// How its surface is made.
+    pub surface: SurfaceSpec,
+    /// Height of the outline above the background plane (of what is below for add, subtract, multiply), mm.
+    pub base_mm: f64,
+    /// Height of the ridge above the background plane (of what is below for add, subtract, multiply), mm.
+    pub height_mm: f64,
+    /// Raises the whole layer (`z_0` of the layer model), mm.
+    pub offset_mm: f64,
+    /// How it joins what is below.
+    pub combine: Combine,
+    /// Radius of the soft seam for max and min, mm; 0 = a crease.
+    pub blend_mm: f64,
+    /// Width over which replace, add and subtract fade in from the outline, mm.
+    pub feather_mm: f64,
+    /// Slope of walls from the vertical (with `base_mm` > 0), radians.
+    pub draft_rad: f64,
+    /// Steepest slope (rise over run) that a narrow figure's flank may get; infinite = no cap.
+    pub slope_cap: f64,
+    /// Melts the layer's paths into one figure.
+    pub union: bool,
+    /// Trims the layer to what the paint order leaves visible.
+    pub visible: bool,
+}
+
+/// How a layer's surface is made from its outline.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+#[serde(rename_all = "kebab-case", tag = "method")]
+#[non_exhaustive]
+pub enum SurfaceSpec {
+    /// Height by the exact distance to the outline.
+    Profile {
+        /// The shape of the flank.
+        profile: Profile,
+        /// Bevel radius: the flank ends and the flat top begins this far inside, mm.
+        /// `None`: the largest inscribed radius of each figure.
+        radius_mm: Option<f64>,
+    },
+}
+
+/// Cross-section `f(u)` of a flank, u = 0 on the outline, 1 on the ridge.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Profile {
+    /// `1 - (1-u)^2`
+    Parabola,
+    /// `sqrt(1 - (1-u)^2)`
+    Round,
+    /// `u`
+    Chamfer,
+    /// `1 - sqrt(1 - u^2)`
+    Cove,
+    /// `3u^2 - 2u^3`
+    Ogee,
+}
+
+/// How a layer joins what is below it; `c` is what is below, `l` the layer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Combine {
+    /// `l`, and nothing is blended: the ground for what follows.
+    Base,
+    /// `c + l`
+    Add,
+    /// The higher of both (default).
+    Max,
+    /// The lower of both.
+    Min,
+    /// `c - l`
+    Subtract,
+    /// `c` times `l / height_mm`.
+    Multiply,
+    /// `l`
+    Replace,
+}
+
+/// One operation with its cutter and speeds, all known.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Operation {
+    /// What it does.
+    pub kind: OperationKind,
+    /// The cutter it uses.
+    pub cutter: CutterSpec,
+    /// Speed along the path, mm/min.
+    pub feed_mm_per_min: f64,
+    /// Highest downward component of any feed move, mm/min.
+    pub plunge_mm_per_min: f64,
+    /// Spindle speed, 1/min.
+    pub spindle_rpm: f64,
+}
+
+/// What an operation does.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+#[serde(rename_all = "kebab-case", tag = "kind")]
+#[non_exhaustive]
+pub enum OperationKind {
+    /// Removes the bulk in levels of constant Z.
+    Rough {
+        /// Wood left on the target, measured normal to it, mm.
+        leave_mm: f64,
+        /// Depth of a level, mm.
+        stepdown_mm: f64,
+        /// Distance of passes, mm.
+        stepover_mm: f64,
+        /// Direction of the passes from the x axis, radians.
+        angle_rad: f64,
+    },
+    /// Parallel passes over the whole target.
+    Raster {
+        /// Distance of the passes.
+        stepover: Stepover,
+        /// Direction of the passes from the x axis, radians.
+        angle_rad: f64,
+    },
+}
+
+/// How far apart finishing passes lie.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Stepover {
+    /// This far, in plan, mm.
+    Plan(f64),
+    /// So that the cusp on level ground has this height, mm.
+    Scallop(f64),
+}
+
+/// A cutter and what holds it.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct CutterSpec {
+    /// Name in job files (`ball-3`).
+    pub name: String,
+    /// Form of the cutting end.
+    pub shape: CutterShape,
+    /// Cutting diameter, mm.
+    pub diameter_mm: f64,
+    /// Number of flutes.
+    pub flutes: u32,
+    /// Length of the flutes from the tip, mm.
+    pub flute_mm: f64,
+    /// Diameter of the shank, mm.
+    pub shank_mm: f64,
+    /// Length from the tip to the collet, mm.
+    pub stickout_mm: f64,
+    /// Diameter of the collet nut, mm.
+    pub holder_mm: f64,
+}
+
+/// Form of the cutting end.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+#[non_exhaustive]
+pub enum CutterShape {
+    /// Flat end mill.
+    Flat,
+    /// Ball-nose end mill: half a sphere of the cutting diameter.
+    Ball,
+}

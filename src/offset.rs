@@ -1,0 +1,1 @@
+//! Heightfield x cutter -> tool-tip field and exact drops at points.

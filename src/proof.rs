@@ -1,0 +1,1 @@
+//! Program text + job -> verdict (gouge, leftover, rapids, envelope, feeds, time).

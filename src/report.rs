@@ -1,0 +1,1 @@
+//! Pictures (PNG), HTML report, mesh export, summaries.

@@ -1,0 +1,1 @@
+//! The wood as a heightfield; removes plain moves of a cutter from it.
