@@ -11,7 +11,13 @@
 
 mod contact;
 mod drop;
+mod exact;
 mod field;
+mod fold;
+mod simd;
 
 pub use drop::Dropper;
 pub use field::{closing, tip_field};
+
+#[cfg(test)]
+mod tests;
