@@ -9,6 +9,7 @@
 //! [`closing`] turns tip heights back into the surface that the cutter leaves.
 //! Beyond the rim of a field there is no material.
 
+mod blocks;
 mod contact;
 mod drop;
 mod exact;
