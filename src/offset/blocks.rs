@@ -56,7 +56,7 @@ impl Fan {
         let (r2, beyond) = (r * r * (1.0 + ROUND_OFF), r * (1.0 + ROUND_OFF) + TOUCH_MM as f32);
         let mut bounds = [f32::NEG_INFINITY; LANES];
         let is_ball = matches!(profile, Profile::Ball { .. });
-        for lane in 0..LANES {
+        for (lane, out) in bounds.iter_mut().enumerate() {
             let dx = x + side * ((lane % FAN) as f32 + 0.5);
             let dy = y + side * ((lane / FAN) as f32 + 0.5);
             let (near_x, near_y) = (dx.abs() - half, dy.abs() - half);
@@ -77,13 +77,13 @@ impl Fan {
                 let lift = self.lift[lane];
                 let fine = lift - r + w + half * fall;
                 let fine = fine + ROUND_OFF * (lift.abs() + r + half * fall);
-                let usable = (w2 > least) & (fine < coarse);
+                let usable = w2 > least && fine < coarse;
                 if usable { fine } else { coarse }
             } else {
                 top
             };
             let reached = near2 <= beyond * beyond * (1.0 + ROUND_OFF);
-            bounds[lane] = if reached { bound } else { f32::NEG_INFINITY };
+            *out = if reached { bound } else { f32::NEG_INFINITY };
         }
         bounds
     }

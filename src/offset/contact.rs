@@ -4,7 +4,7 @@
 //! height of the cutter's TIP at the moment of touch; [`f64::NEG_INFINITY`] says that it never touches.
 //! The surface minus the profile is concave over a facet and over an edge: its highest value is either
 //! the one place where its slope vanishes, or it lies on the border, that is on an edge or a vertex
-//! (the vertex, edge and facet drops of OpenCAMLib, Wallin 2007-2018, in closed form).
+//! (the vertex, edge and facet drops of A. Wallin's `OpenCAMLib`, here in closed form).
 
 use crate::cutter::Profile;
 use crate::geom::DVec2;
