@@ -85,11 +85,9 @@ fn arcs_run_the_right_way_in_every_plane() {
         }
     }
     let p = ok("G0 Z0\nF1000\nG18 G2 X20 Z0 I10 K0\n");
-    let top = p.moves.iter().map(|m| m.to.z).fold(f64::MIN, f64::max);
-    assert!(
-        (top - 10.0).abs() < 0.01,
-        "G2 in ZX looks mirrored in an XZ drawing: over the top, {top}"
-    );
+    // G18 looks along +y, so that in an XZ drawing (x right, z up) a clockwise arc runs the other way.
+    let low = p.moves.iter().map(|m| m.to.z).fold(f64::MAX, f64::min);
+    assert!((low + 10.0).abs() < 0.01, "{low}");
 }
 
 #[test]
