@@ -6,7 +6,7 @@
 mod types;
 
 pub use types::{
-    ArtworkSpec, Background, Combine, CutterShape, CutterSpec, Fit, Job, LayerSpec, Machine,
-    Operation, OperationKind, Origin, Place, Profile, ReliefSpec, Rgb, Selector, Stepover, Stock,
-    SurfaceSpec, Wood,
+    ArtworkSpec, Background, Combine, CutterShape, CutterSpec, Fit, Found, FoundLayer, Job,
+    LayerSpec, Machine, Operation, OperationKind, Origin, Place, Profile, ReliefSpec, Rgb,
+    Selector, Stepover, Stock, SurfaceSpec, Wood,
 };
