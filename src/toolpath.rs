@@ -18,6 +18,11 @@ mod rough;
 mod rows;
 mod trace;
 
+#[cfg(test)]
+pub(crate) mod fixture;
+#[cfg(test)]
+mod tests;
+
 pub use check::PathFault;
 
 use crate::geom::{Heightfield, Move};
