@@ -177,3 +177,6 @@ impl Text {
         String::from_utf8(self.bytes).expect("only ASCII bytes are pushed")
     }
 }
+
+#[cfg(test)]
+mod tests;
