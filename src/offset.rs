@@ -9,9 +9,16 @@
 //! [`closing`] turns tip heights back into the surface that the cutter leaves.
 //! Beyond the rim of a field there is no material.
 
+mod blocks;
 mod contact;
 mod drop;
+mod exact;
 mod field;
+mod fold;
+mod simd;
 
 pub use drop::Dropper;
 pub use field::{closing, tip_field};
+
+#[cfg(test)]
+mod tests;
