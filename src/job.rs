@@ -18,7 +18,7 @@ pub use draft::Draft;
 pub use error::{Fault, JobError};
 pub use library::{BUILT_IN_FILES, Library};
 pub use types::{
-    ArtworkSpec, Background, Combine, CutterShape, CutterSpec, Fit, Job, LayerSpec, Machine,
-    Operation, OperationKind, Origin, Place, Profile, ReliefSpec, Rgb, Selector, Stepover, Stock,
-    SurfaceSpec, Wood,
+    ArtworkSpec, Background, Combine, CutterShape, CutterSpec, Fit, Found, FoundLayer, Job,
+    LayerSpec, Machine, Operation, OperationKind, Origin, Place, Profile, ReliefSpec, Rgb,
+    Selector, Stepover, Stock, SurfaceSpec, Wood,
 };
