@@ -13,6 +13,7 @@
 pub(crate) mod boolean;
 mod clip;
 mod colour_name;
+mod found;
 mod place;
 mod read;
 mod source;

@@ -3,9 +3,11 @@
 mod carve;
 mod check;
 mod files;
+mod inputs;
 mod lists;
 mod new;
 mod observe;
+mod outcome;
 
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
@@ -54,8 +56,6 @@ enum Stop {
     Refused(anyhow::Error),
     /// A check of the finished programs failed: exit code 4.
     CheckFailed(String),
-    /// Ctrl-C: exit code 130.
-    Interrupted,
 }
 
 impl<E: Into<anyhow::Error>> From<E> for Stop {
@@ -90,10 +90,6 @@ pub fn main() -> ExitCode {
         Err(Stop::CheckFailed(text)) => {
             observe::complain(&text);
             ExitCode::from(CHECK_FAILED)
-        }
-        Err(Stop::Interrupted) => {
-            observe::complain("interrupted: nothing was written");
-            ExitCode::from(INTERRUPTED)
         }
     }
 }

@@ -165,7 +165,8 @@ fn artwork_alone_is_carved_with_defaults() {
     desk.put("small.toml", ""); // an unrelated file beside it
     let out = desk.run(&["carve", "leaf.svg", "--out", "made"]);
     assert_eq!(out.status.code(), Some(0), "{}", stderr(&out));
-    assert!(stderr(&out).contains("150 mm"), "the default size is said aloud: {}", stderr(&out));
+    let said = String::from_utf8_lossy(&out.stdout);
+    assert!(said.contains("150 mm"), "the default size is said aloud: {said}");
     let files = desk.files();
     assert!(files.contains_key("made/relief.png"));
     assert!(!files.contains_key("leaf-carving"));

@@ -16,6 +16,36 @@ pub fn file_stem(number: usize, path: &Toolpath) -> String {
     format!("{number}-{}", path.name)
 }
 
+/// The comment lines at the head of a program that takes `seconds`; always the same number of lines.
+/// What the last one says holds for every program on a disk: one that fails its proof is never written.
+pub fn header(job: &Job, number: usize, path: &Toolpath, seconds: f64) -> Vec<String> {
+    let lowest = path.moves.iter().map(|m| m.to.z).fold(0.0, f64::min);
+    let cutter = &path.cutter;
+    let minutes = (seconds / 60.0).floor();
+    vec![
+        format!("relievo {} - {} - program {number}", env!("CARGO_PKG_VERSION"), job.title),
+        format!(
+            "machine {}, stock {} x {} x {} mm {}",
+            job.machine.name,
+            job.stock.width_mm,
+            job.stock.height_mm,
+            job.stock.thickness_mm,
+            job.stock.wood.name
+        ),
+        format!("zero X Y: {} of the stock; zero Z: its top", job.stock.origin.words()),
+        format!(
+            "cutter {}, diameter {} mm, at least {} mm out of the collet; S{}",
+            cutter.name, cutter.diameter_mm, cutter.stickout_mm, path.spindle_rpm
+        ),
+        format!("lowest Z {lowest:.3} mm, safe Z {} mm", job.safe_z_mm),
+        format!("time {minutes:.0} min {:02.0} s by the planner model", seconds - minutes * 60.0),
+        format!(
+            "proof: dry run of these bytes, no gouge over {} mm, no rapid in wood",
+            job.tolerance.gouge_mm
+        ),
+    ]
+}
+
 /// The program of a toolpath: `header` as comments, preamble, moves, end.
 ///
 /// Every header line makes exactly one line of the program, cut at [`MAX_LINE`]; characters that a

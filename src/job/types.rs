@@ -144,6 +144,17 @@ impl Origin {
             Self::Center => DVec2::splat(0.5),
         }
     }
+
+    /// The place in words: `lower left corner`.
+    pub fn words(self) -> &'static str {
+        match self {
+            Self::LowerLeft => "lower left corner",
+            Self::LowerRight => "lower right corner",
+            Self::UpperLeft => "upper left corner",
+            Self::UpperRight => "upper right corner",
+            Self::Center => "center",
+        }
+    }
 }
 
 /// A kind of wood: what it lets a cutter do.
