@@ -12,6 +12,9 @@ mod library;
 mod draft;
 mod speeds;
 mod settle;
+mod write;
+#[cfg(test)]
+mod tests;
 
 pub use colors::swatch_name;
 pub use draft::Draft;
@@ -22,3 +25,4 @@ pub use types::{
     LayerSpec, Machine, Operation, OperationKind, Origin, Place, Profile, ReliefSpec, Rgb,
     Selector, Stepover, Stock, SurfaceSpec, Wood,
 };
+pub use write::{defaults_table, template};

@@ -305,7 +305,7 @@ pub(super) static RELIEF: Section = Section {
 /// The table form of `relief.background`.
 pub(super) static BACKGROUND: Section = Section {
     name: "background",
-    header: "",
+    header: "background = { ... }",
     doc: "what happens outside the artwork",
     keys: &[
         key(

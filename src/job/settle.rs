@@ -63,7 +63,13 @@ impl Draft {
     }
 
     fn impossible(&self, paths: &[&str], message: &str, help: &str) -> JobError {
-        JobError::Impossible(self.source.fault(self.source.span_of(paths), message, "", help))
+        // A job file cures what the artwork alone is wrong in, but for artwork without any shape.
+        let help = if self.source.is_written() || paths == ["artwork.file"] {
+            help.to_owned()
+        } else {
+            format!("{help}; `relievo new {}` writes a job file to do it in", self.artwork.file)
+        };
+        JobError::Impossible(self.source.fault(self.source.span_of(paths), message, "", &help))
     }
 
     /// mm a file unit, and the size of the placed artwork.
@@ -474,7 +480,7 @@ impl Draft {
         let kind = match draft.kind {
             KindDraft::Rough => {
                 let stepdown_mm = draft.stepdown_mm.unwrap_or_else(|| {
-                    (stock.wood.stepdown_per_diameter * diameter).min(cutter.flute_mm)
+                    round(stock.wood.stepdown_per_diameter * diameter).min(cutter.flute_mm)
                 });
                 if stepdown_mm > cutter.flute_mm {
                     let message = format!(
@@ -490,14 +496,18 @@ impl Draft {
                 OperationKind::Rough {
                     leave_mm: draft.leave_mm,
                     stepdown_mm,
-                    stepover_mm: draft.stepover_mm.unwrap_or(rule::ROUGH_STEPOVER * diameter),
+                    stepover_mm: draft
+                        .stepover_mm
+                        .unwrap_or(round(rule::ROUGH_STEPOVER * diameter)),
                     angle_rad,
                 }
             }
             KindDraft::Raster => {
                 let stepover = match (draft.stepover_mm, draft.scallop_mm, cutter.shape) {
                     (Some(plan), _, _) => Stepover::Plan(plan),
-                    (None, _, CutterShape::Flat) => Stepover::Plan(rule::FLAT_STEPOVER * diameter),
+                    (None, _, CutterShape::Flat) => {
+                        Stepover::Plan(round(rule::FLAT_STEPOVER * diameter))
+                    }
                     (None, scallop, CutterShape::Ball) => {
                         let scallop = scallop.unwrap_or(self.tolerance.scallop_mm);
                         if scallop >= diameter / 2.0 {
@@ -629,7 +639,7 @@ fn stem(file: &str) -> String {
     if stem.trim().is_empty() { "carving".to_owned() } else { stem.to_owned() }
 }
 
-/// For messages: three decimals.
+/// Three decimals: enough for people, and for what a rule of thumb gives.
 fn round(mm: f64) -> f64 {
     (mm * 1000.0).round() / 1000.0
 }
