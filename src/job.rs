@@ -11,6 +11,8 @@ mod reader;
 mod library;
 mod draft;
 mod speeds;
+mod layer;
+mod operation;
 mod settle;
 mod write;
 #[cfg(test)]

@@ -152,6 +152,7 @@ impl Source {
     }
 
     /// Describes a fault at `span`: `label` stands under the marked text, `help` below the picture.
+    #[allow(clippy::unnecessary_box_returns, reason = "every error holds it boxed")]
     pub(super) fn fault(
         &self,
         span: Option<Range<usize>>,

@@ -61,7 +61,7 @@ fn refused(text: &str, kind: fn(&JobError) -> bool, place: (usize, usize), words
     }
 }
 
-const PRODUCT_EXAMPLE: &str = r##"
+const PRODUCT_EXAMPLE: &str = r#"
 title = "Lotus"
 machine = "shapeoko3"            # machines/shapeoko3.toml, or a path
 strict = true
@@ -116,7 +116,7 @@ kind = "raster"
 cutter = "ball-3"
 scallop_mm = 0.01
 angle_deg = 45
-"##;
+"#;
 
 #[test]
 fn the_whole_example_is_read() {
@@ -539,6 +539,11 @@ fn what_does_not_fit_together_is_refused() {
         &["above 0"],
     );
     refused(&with("[relief]\nbackground = {}\n"), kind, (4, 14), &["frame_mm or leave_mm"]);
+}
+
+#[test]
+fn operations_that_cannot_be_done_are_refused() {
+    let kind = |e: &JobError| matches!(e, JobError::Impossible(_));
     let operation = |lines: &str| with(&format!("[[operation]]\n{lines}\n"));
     refused(
         &operation("kind = \"raster\"\nleave_mm = 1"),

@@ -133,7 +133,7 @@ pub fn defaults_table() -> String {
         let _ = writeln!(text, "{gap}{title}: {}", section.doc);
         // A section of its own says more than its line at the top would.
         let shown = section.keys.iter().filter(|key| {
-            !(std::ptr::eq(*section, &TOP)
+            !(section.name == TOP.name
                 && JOB.iter().any(|other| other.header == format!("[{}]", key.name)))
         });
         for key in shown {
@@ -163,8 +163,7 @@ impl Page {
         self.header(section, &format!("# {}", section.doc));
         for key in section.keys {
             let Some((_, value)) = lines.iter().find(|(name, _)| *name == key.name) else {
-                if let (Fallback::Rule(rule), true) = (key.default, std::ptr::eq(section, &ARTWORK))
-                {
+                if let (Fallback::Rule(rule), true) = (key.default, section.name == ARTWORK.name) {
                     let _ = writeln!(self.text, "#   {}: {} (now: {rule})", key.name, key.doc);
                 }
                 continue;
