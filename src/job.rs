@@ -11,7 +11,12 @@ mod reader;
 mod library;
 mod draft;
 mod speeds;
+mod layer;
+mod operation;
 mod settle;
+mod write;
+#[cfg(test)]
+mod tests;
 
 pub use colors::swatch_name;
 pub use draft::Draft;
@@ -22,3 +27,4 @@ pub use types::{
     LayerSpec, Machine, Operation, OperationKind, Origin, Place, Profile, ReliefSpec, Rgb,
     Selector, Stepover, Stock, SurfaceSpec, Wood,
 };
+pub use write::{defaults_table, template};

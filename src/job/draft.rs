@@ -1,22 +1,19 @@
 //! A job file -> [`Draft`]: all that can be checked before the artwork is read.
 
 use std::io;
-use std::ops::Range;
 
 use toml::de::{DeTable, DeValue};
 
-use super::colors;
-use super::error::{JobError, Source, nearest, shown};
+use super::error::{JobError, Source, shown};
 use super::keys::{
-    ARTWORK, AT, BACKGROUND, CUTTER, LAYER, MACHINE, METHODS, OPERATION, OPERATIONS, RELIEF,
-    SAFETY, SLOPE_CAP, STOCK, SURFACE, TOLERANCE, TOP, WOOD, rule,
+    ARTWORK, AT, BACKGROUND, LAYER, MACHINE, OPERATION, RELIEF, SAFETY, STOCK, TOLERANCE, TOP,
+    WOOD, rule,
 };
-use super::library::{Library, read_cutter, read_machine, read_machine_file, read_wood};
+use super::layer::{LayerDraft, read_layer};
+use super::library::{Library, read_machine, read_machine_file, read_wood};
+use super::operation::{OperationDraft, default_operations, read_operation};
 use super::reader::{Table, as_number};
-use super::types::{
-    ArtworkSpec, Combine, CutterShape, CutterSpec, Fit, LayerSpec, Machine, Origin, Place, Profile,
-    Rgb, Selector, SurfaceSpec, Wood,
-};
+use super::types::{ArtworkSpec, Fit, Machine, Origin, Place, Wood};
 use crate::geom::{DVec2, Tolerance};
 
 /// A checked job in which what hangs on the artwork is still open: sizes, stock, layers.
@@ -58,36 +55,6 @@ pub(super) enum BackgroundDraft {
     Frame(f64),
     /// `None`: by the widest cutter.
     Leave(Option<f64>),
-}
-
-/// A layer whose height may still be open.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct LayerDraft {
-    /// Complete but for the height when that is open.
-    pub(super) spec: LayerSpec,
-    pub(super) height_mm: Option<f64>,
-}
-
-/// An operation whose numbers may still be open.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct OperationDraft {
-    pub(super) kind: KindDraft,
-    pub(super) cutter: CutterSpec,
-    pub(super) leave_mm: f64,
-    pub(super) stepdown_mm: Option<f64>,
-    pub(super) stepover_mm: Option<f64>,
-    pub(super) scallop_mm: Option<f64>,
-    pub(super) angle_rad: Option<f64>,
-    pub(super) feed_mm_per_min: Option<f64>,
-    pub(super) plunge_mm_per_min: Option<f64>,
-    pub(super) spindle_rpm: Option<f64>,
-}
-
-/// What an operation does.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum KindDraft {
-    Rough,
-    Raster,
 }
 
 impl Draft {
@@ -248,26 +215,8 @@ fn read_wood_choice(stock: &Table<'_>, library: &Library) -> Result<Wood, JobErr
     })
 }
 
-fn read_cutter_choice(
-    table: &Table<'_>,
-    default: &'static str,
-    library: &Library,
-) -> Result<CutterSpec, JobError> {
-    if matches!(table.raw("cutter").map(toml::Spanned::get_ref), Some(DeValue::Table(_))) {
-        return read_cutter(&table.table("cutter", &CUTTER).expect("the cutter is given")?, None);
-    }
-    let name = match table.raw("cutter") {
-        Some(_) => text_or_form(table, "cutter")?,
-        None => default,
-    };
-    library.cutter(name).cloned().ok_or_else(|| {
-        let names: Vec<&str> = library.cutters().map(|cutter| cutter.name.as_str()).collect();
-        table.unknown_word("cutter", "cutter", name, &names)
-    })
-}
-
 /// A text behind a key of several forms, given or by default.
-fn text_or_form<'a>(table: &Table<'a>, name: &str) -> Result<&'a str, JobError> {
+pub(super) fn text_or_form<'a>(table: &Table<'a>, name: &str) -> Result<&'a str, JobError> {
     match (table.text(name), table.raw(name)) {
         (Some(text), _) => Ok(text),
         (None, Some(value)) => Err(table.wrong_form(name, value.span(), value.get_ref())),
@@ -366,253 +315,4 @@ fn read_tolerance(table: &Table<'_>) -> Result<Tolerance, JobError> {
         return Err(table.impossible(name, &message, "", help));
     }
     Ok(tolerance)
-}
-
-fn read_layer(table: &Table<'_>) -> Result<LayerDraft, JobError> {
-    let text = text_or_form(table, "select")?;
-    let select = read_selector(table, text)?;
-    let name = table.text("name").map_or_else(|| select.to_string(), str::to_owned);
-    layer(table, select, name)
-}
-
-/// A layer without keys of its own: everything by default.
-pub(super) fn default_layer(select: Selector, name: String) -> LayerDraft {
-    let (source, nothing) = (Source::default(), DeTable::new());
-    layer(&Table::unchecked(&source, &LAYER, &nothing), select, name)
-        .expect("the defaults go together: a test reads them")
-}
-
-fn layer(table: &Table<'_>, select: Selector, name: String) -> Result<LayerDraft, JobError> {
-    let combine = [
-        Combine::Base,
-        Combine::Add,
-        Combine::Max,
-        Combine::Min,
-        Combine::Subtract,
-        Combine::Multiply,
-        Combine::Replace,
-    ][table.choice("combine")];
-    let height_mm = table.number("height_mm");
-    let relative = matches!(combine, Combine::Add | Combine::Subtract | Combine::Multiply);
-    if height_mm.is_none() && relative {
-        let message = format!(
-            "a layer that is combined by {} needs height_mm",
-            table.text("combine").unwrap_or("")
-        );
-        let help = "height_mm is measured from what is below; only layers that stand by themselves have a default";
-        let fault =
-            table.source.fault(Some(table.span_of("combine")), &message, "needs `height_mm`", help);
-        return Err(JobError::Missing(fault));
-    }
-    if combine == Combine::Multiply && height_mm == Some(0.0) {
-        let message = "a layer that multiplies needs height_mm above 0";
-        let help = "what is below is scaled by the layer's height over its height_mm";
-        return Err(table.impossible("height_mm", message, "", help));
-    }
-    let spec = LayerSpec {
-        name,
-        select,
-        surface: read_surface(table)?,
-        base_mm: table.sure_number("base_mm"),
-        height_mm: height_mm.unwrap_or_default(),
-        offset_mm: table.sure_number("offset_mm"),
-        combine,
-        blend_mm: table.sure_number("blend_mm"),
-        feather_mm: table.sure_number("feather_mm"),
-        draft_rad: table.sure_number("draft_deg").to_radians(),
-        slope_cap: read_slope_cap(table)?,
-        union: table.flag("union"),
-        visible: table.flag("visible"),
-    };
-    Ok(LayerDraft { spec, height_mm })
-}
-
-fn read_slope_cap(table: &Table<'_>) -> Result<f64, JobError> {
-    let Some(value) = table.raw("slope_cap") else { return Ok(table.sure_number("slope_cap")) };
-    match (value.get_ref(), as_number(value.get_ref())) {
-        (DeValue::String(word), _) if word == "none" => Ok(f64::INFINITY),
-        (_, Some(number)) => {
-            table.check_range("slope_cap", value.span(), number, SLOPE_CAP)?;
-            Ok(number)
-        }
-        (other, None) => Err(table.wrong_form("slope_cap", value.span(), other)),
-    }
-}
-
-fn read_surface(layer: &Table<'_>) -> Result<SurfaceSpec, JobError> {
-    let profiles =
-        [Profile::Parabola, Profile::Round, Profile::Chamfer, Profile::Cove, Profile::Ogee];
-    let plain = SurfaceSpec::Profile { profile: Profile::Parabola, radius_mm: None };
-    let Some(value) = layer.raw("surface") else { return Ok(plain) };
-    if let DeValue::Table(values) = value.get_ref() {
-        // The method comes first: another method's own keys would only mislead.
-        let method = values.get("method").and_then(|method| method.get_ref().as_str());
-        if let Some(method) = method {
-            check_method(layer, method, values.get("method").map(toml::Spanned::span))?;
-        }
-        let table = layer.table("surface", &SURFACE).expect("the table is given")?;
-        text_or_form(&table, "method")?;
-        return Ok(SurfaceSpec::Profile {
-            profile: profiles[table.choice("profile")],
-            radius_mm: table.number("radius_mm"),
-        });
-    }
-    check_method(layer, text_or_form(layer, "surface")?, None)?;
-    Ok(plain)
-}
-
-fn check_method(
-    layer: &Table<'_>,
-    method: &str,
-    span: Option<Range<usize>>,
-) -> Result<(), JobError> {
-    if METHODS.contains(&method) {
-        return Ok(());
-    }
-    let message = format!("there is no surface method {}", shown(method));
-    let help = format!(
-        "there is: {}; shapes of its flank: surface = {{ method = \"profile\", profile = \"round\" }} ({})",
-        METHODS.join(", "),
-        super::keys::PROFILES.join(", ")
-    );
-    let span = span.unwrap_or_else(|| layer.span_of("surface"));
-    Err(JobError::UnknownName(layer.source.fault(Some(span), &message, "not built in", &help)))
-}
-
-fn read_selector(table: &Table<'_>, text: &str) -> Result<Selector, JobError> {
-    const KINDS: [&str; 6] = ["fill", "stroke", "label", "id", "layer", "all"];
-    let text = text.trim();
-    if text == "all" {
-        return Ok(Selector::All);
-    }
-    let refuse = |message: &str, label: &str, help: &str| {
-        let span = Some(table.span_of("select"));
-        Err(JobError::UnknownName(table.source.fault(span, message, label, help)))
-    };
-    let forms = "write \"fill:#008463\", \"stroke:black\", \"label:...\", \"id:...\", \"layer:...\" or \"all\"";
-    let Some((kind, rest)) = text.split_once(':') else {
-        let message = format!("{} is not a selector", shown(text));
-        return if read_color(text).is_some() {
-            refuse(&message, &format!("did you mean \"fill:{text}\"?"), forms)
-        } else {
-            refuse(&message, "what is it: a fill, a label, ...?", forms)
-        };
-    };
-    let (kind, rest) = (kind.trim(), rest.trim());
-    if rest.is_empty() {
-        return refuse(&format!("the selector {} is empty", shown(text)), "", forms);
-    }
-    match kind {
-        "fill" | "stroke" => match read_color(rest) {
-            Some(color) if kind == "fill" => Ok(Selector::Fill(color)),
-            Some(color) => Ok(Selector::Stroke(color)),
-            None => {
-                let message = format!("there is no colour {}", shown(rest));
-                let label = match nearest(rest, colors::names()).filter(|_| !rest.starts_with('#'))
-                {
-                    Some(near) => format!("did you mean \"{kind}:{near}\"?"),
-                    None => "not a colour".to_owned(),
-                };
-                refuse(&message, &label, "a colour is #rrggbb, #rgb or a CSS name such as tomato")
-            }
-        },
-        "label" => Ok(Selector::Label(rest.to_owned())),
-        "id" => Ok(Selector::Id(rest.to_owned())),
-        "layer" => Ok(Selector::Layer(rest.to_owned())),
-        _ => {
-            let message = format!("there is no selector {}", shown(&format!("{kind}:")));
-            let label = match nearest(kind, KINDS) {
-                Some(near) => format!("did you mean \"{near}:\"?"),
-                None => "not known".to_owned(),
-            };
-            refuse(&message, &label, forms)
-        }
-    }
-}
-
-/// `#rrggbb`, `#rgb` or a CSS name.
-fn read_color(text: &str) -> Option<Rgb> {
-    let Some(hex) = text.strip_prefix('#') else { return colors::named(text) };
-    if !hex.bytes().all(|b| b.is_ascii_hexdigit()) {
-        return None;
-    }
-    let digits = u32::from_str_radix(hex, 16).ok()?;
-    let byte = |shift: u32| (digits >> shift) as u8;
-    let double = |shift: u32| ((digits >> shift) & 15) as u8 * 17;
-    match hex.len() {
-        6 => Some(Rgb(byte(16), byte(8), byte(0))),
-        3 => Some(Rgb(double(8), double(4), double(0))),
-        _ => None,
-    }
-}
-
-/// The operations of a job that names none: rough, then raster.
-fn default_operations(source: &Source, library: &Library) -> Result<Vec<OperationDraft>, JobError> {
-    let nothing = DeTable::new();
-    let table = Table::unchecked(source, &OPERATION, &nothing);
-    [KindDraft::Rough, KindDraft::Raster]
-        .into_iter()
-        .map(|kind| operation(&table, kind, library))
-        .collect()
-}
-
-fn read_operation(table: &Table<'_>, library: &Library) -> Result<OperationDraft, JobError> {
-    let word = text_or_form(table, "kind")?;
-    let kind = match OPERATIONS.iter().position(|name| *name == word) {
-        Some(0) => KindDraft::Rough,
-        Some(_) => KindDraft::Raster,
-        None => return Err(table.unknown_word("kind", "kind of operation", word, OPERATIONS)),
-    };
-    let foreign: &[&str] = match kind {
-        KindDraft::Rough => &["scallop_mm"],
-        KindDraft::Raster => &["leave_mm", "stepdown_mm"],
-    };
-    if let Some(name) = foreign.iter().find(|name| table.raw(name).is_some()) {
-        let message = format!("`{name}` means nothing to a {word} operation");
-        let doc = table.section.key(name).map_or("", |key| key.doc);
-        return Err(table.impossible(
-            name,
-            &message,
-            "take this away",
-            &format!("{name} is for {doc}"),
-        ));
-    }
-    let draft = operation(table, kind, library)?;
-    if draft.stepover_mm.is_some() && draft.scallop_mm.is_some() {
-        let message = "the distance of the passes is given twice: by stepover_mm and by scallop_mm";
-        return Err(table.impossible("stepover_mm", message, "", "keep one of the two"));
-    }
-    if draft.scallop_mm.is_some() && draft.cutter.shape == CutterShape::Flat {
-        let message = format!("a flat cutter ({}) leaves no cusps", draft.cutter.name);
-        return Err(table.impossible(
-            "scallop_mm",
-            &message,
-            "",
-            "give stepover_mm, or take a ball cutter",
-        ));
-    }
-    Ok(draft)
-}
-
-fn operation(
-    table: &Table<'_>,
-    kind: KindDraft,
-    library: &Library,
-) -> Result<OperationDraft, JobError> {
-    let default_cutter = match kind {
-        KindDraft::Rough => rule::CUTTERS.0,
-        KindDraft::Raster => rule::CUTTERS.1,
-    };
-    Ok(OperationDraft {
-        kind,
-        cutter: read_cutter_choice(table, default_cutter, library)?,
-        leave_mm: table.sure_number("leave_mm"),
-        stepdown_mm: table.number("stepdown_mm"),
-        stepover_mm: table.number("stepover_mm"),
-        scallop_mm: table.number("scallop_mm"),
-        angle_rad: table.number("angle_deg").map(f64::to_radians),
-        feed_mm_per_min: table.number("feed_mm_per_min"),
-        plunge_mm_per_min: table.number("plunge_mm_per_min"),
-        spindle_rpm: table.number("spindle_rpm"),
-    })
 }

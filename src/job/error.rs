@@ -141,12 +141,18 @@ impl Source {
         }
     }
 
+    /// False for the job that no file was written for.
+    pub(super) fn is_written(&self) -> bool {
+        !self.text.is_empty()
+    }
+
     /// Where the first of these values stands that the file gives.
     pub(super) fn span_of(&self, paths: &[&str]) -> Option<Range<usize>> {
         paths.iter().find_map(|path| self.spans.get(*path).cloned())
     }
 
     /// Describes a fault at `span`: `label` stands under the marked text, `help` below the picture.
+    #[allow(clippy::unnecessary_box_returns, reason = "every error holds it boxed")]
     pub(super) fn fault(
         &self,
         span: Option<Range<usize>>,

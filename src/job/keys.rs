@@ -112,6 +112,10 @@ pub(super) mod rule {
     pub(in crate::job) const FLAT_STEPOVER: f64 = 0.1;
     /// Spindle speed wanted when the job gives none, 1/min.
     pub(in crate::job) const SPINDLE_RPM: f64 = 18_000.0;
+    /// Slowest spindle speed that a rule may choose, 1/min: below it nothing is cut.
+    pub(in crate::job) const SLOWEST_RPM: f64 = 100.0;
+    /// Smallest depth of a level that a rule may choose, mm.
+    pub(in crate::job) const LEAST_STEPDOWN_MM: f64 = 0.01;
     /// Plunge speed as a fraction of the feed.
     pub(in crate::job) const PLUNGE: f64 = 0.25;
     /// `background = "leave"`: cleared this much further than the largest cutter is wide, mm.
@@ -305,7 +309,7 @@ pub(super) static RELIEF: Section = Section {
 /// The table form of `relief.background`.
 pub(super) static BACKGROUND: Section = Section {
     name: "background",
-    header: "",
+    header: "background = { ... }",
     doc: "what happens outside the artwork",
     keys: &[
         key(
@@ -495,7 +499,7 @@ pub(super) static OPERATION: Section = Section {
         key("leave_mm", mm(0.0, 20.0), Number(0.5), "rough: wood left on the relief"),
         key(
             "stepdown_mm",
-            mm(0.05, 100.0),
+            mm(0.01, 100.0),
             Rule("the wood's stepdown_per_diameter x diameter"),
             "rough: depth of a level",
         ),
@@ -519,13 +523,13 @@ pub(super) static OPERATION: Section = Section {
         ),
         key(
             "feed_mm_per_min",
-            Kind::Number { min: 10.0, max: 60_000.0, unit: "mm/min" },
+            Kind::Number { min: 0.1, max: 60_000.0, unit: "mm/min" },
             Rule("chip load x flutes x spindle_rpm, at most the machine's speed"),
             "speed along the path",
         ),
         key(
             "plunge_mm_per_min",
-            Kind::Number { min: 1.0, max: 60_000.0, unit: "mm/min" },
+            Kind::Number { min: 0.01, max: 60_000.0, unit: "mm/min" },
             Rule("25 % of the feed, at most the Z axis's speed"),
             "highest downward speed",
         ),
@@ -574,7 +578,7 @@ pub(super) static MACHINE: Section = Section {
         ),
         key(
             "spindle_max_rpm",
-            Kind::Number { min: 1.0, max: 100_000.0, unit: "1/min" },
+            Kind::Number { min: 100.0, max: 100_000.0, unit: "1/min" },
             Required,
             "fastest spindle speed",
         ),

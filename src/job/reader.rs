@@ -131,7 +131,7 @@ impl<'a> Table<'a> {
         self.items(name)
             .filter_map(|item| {
                 let pair = item.get_ref().as_array()?;
-                Some((as_number(pair.get(0)?.get_ref())?, as_number(pair.get(1)?.get_ref())?))
+                Some((as_number(pair.first()?.get_ref())?, as_number(pair.get(1)?.get_ref())?))
             })
             .collect()
     }

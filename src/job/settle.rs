@@ -1,19 +1,14 @@
 //! [`Draft`] + what the artwork holds -> [`Job`]: sizes, stock, layers, speeds, and all checks that
 //! need the whole.
 
-use super::colors;
-use super::draft::{BackgroundDraft, Draft, KindDraft, LayerDraft, OperationDraft, default_layer};
+use super::draft::{BackgroundDraft, Draft};
 use super::error::JobError;
 use super::keys::rule;
-use super::speeds::{self, Wanted};
-use super::types::{
-    Background, Combine, CutterShape, Fit, Found, FoundLayer, Job, LayerSpec, Operation,
-    OperationKind, Place, ReliefSpec, Selector, Stepover, Stock,
-};
+use super::types::{Background, Fit, Found, Job, Place, ReliefSpec, Stock};
 use crate::geom::{Bounds, DVec2, Grid};
 
 /// Round-off allowed when the artwork just fits into the stock, mm.
-const TOUCHING_MM: f64 = 1e-6;
+pub(super) const TOUCHING_MM: f64 = 1e-6;
 
 /// Millimetres a pixel has by the CSS rule of 96 px an inch.
 const PIXEL_MM: f64 = 25.4 / 96.0;
@@ -62,8 +57,15 @@ impl Draft {
         })
     }
 
-    fn impossible(&self, paths: &[&str], message: &str, help: &str) -> JobError {
-        JobError::Impossible(self.source.fault(self.source.span_of(paths), message, "", help))
+    /// Refuses what does not go together; points at the first of `paths` that the job gives.
+    pub(super) fn impossible(&self, paths: &[&str], message: &str, help: &str) -> JobError {
+        // A job file cures what the artwork alone is wrong in, but for artwork without any shape.
+        let help = if self.source.is_written() || paths == ["artwork.file"] {
+            help.to_owned()
+        } else {
+            format!("{help}; `relievo new {}` writes a job file to do it in", self.artwork.file)
+        };
+        JobError::Impossible(self.source.fault(self.source.span_of(paths), message, "", &help))
     }
 
     /// mm a file unit, and the size of the placed artwork.
@@ -82,17 +84,14 @@ impl Draft {
             return Err(self.impossible(&["artwork.file"], &message, help));
         }
         let own_mm = found.unit_mm.unwrap_or(PIXEL_MM);
+        // The side that is asked for must not lose a digit on the way through the file's units.
+        let by_width = |width: f64| (width / given.x, DVec2::new(width, width * given.y / given.x));
+        let by_height =
+            |height: f64| (height / given.y, DVec2::new(height * given.x / given.y, height));
         let (unit, size) = match self.artwork.fit {
-            Fit::Width(width) => (width / given.x, DVec2::new(width, width * given.y / given.x)),
-            Fit::Height(height) => {
-                (height / given.y, DVec2::new(height * given.x / given.y, height))
-            }
-            Fit::Box(width, height) if width * given.y <= height * given.x => {
-                (width / given.x, DVec2::new(width, width * given.y / given.x))
-            }
-            Fit::Box(_, height) => {
-                (height / given.y, DVec2::new(height * given.x / given.y, height))
-            }
+            Fit::Width(width) => by_width(width),
+            Fit::Box(width, height) if width * given.y <= height * given.x => by_width(width),
+            Fit::Height(height) | Fit::Box(_, height) => by_height(height),
             Fit::Scale(scale) => (own_mm * scale, given * own_mm * scale),
             Fit::Own if found.unit_mm.is_some() => (own_mm, given * own_mm),
             Fit::Own => {
@@ -290,336 +289,6 @@ impl Draft {
         )?;
         Ok(pitch)
     }
-
-    fn layers(&self, found: &Found) -> Result<Vec<LayerSpec>, JobError> {
-        let drafts = if self.layers.is_empty() {
-            default_layers(&found.layers)
-        } else {
-            for (index, layer) in self.layers.iter().enumerate() {
-                self.check_selector(index, &layer.spec, &found.selectors)?;
-            }
-            self.layers.clone()
-        };
-        if drafts.is_empty() {
-            let message = format!("{} holds no layer that can be carved", self.artwork.file);
-            let help = "fill a shape or give a stroke a width, or name a layer by [[layer]]";
-            return Err(self.impossible(&["artwork.file"], &message, help));
-        }
-        let count = drafts.len();
-        let layers: Vec<LayerSpec> = drafts
-            .into_iter()
-            .enumerate()
-            .map(|(index, layer)| LayerSpec {
-                height_mm: layer
-                    .height_mm
-                    .unwrap_or_else(|| stepped_height_mm(index, count, self.depth_mm)),
-                ..layer.spec
-            })
-            .collect();
-        self.check_heights(&layers)?;
-        Ok(layers)
-    }
-
-    fn check_selector(
-        &self,
-        index: usize,
-        layer: &LayerSpec,
-        there: &[Selector],
-    ) -> Result<(), JobError> {
-        if layer.select == Selector::All || there.contains(&layer.select) {
-            return Ok(());
-        }
-        let near = nearest_selector(&layer.select, there);
-        let message = format!("layer '{}': nothing in the artwork is {}", layer.name, layer.select);
-        let label = near.map_or(String::new(), |near| format!("did you mean \"{near}\"?"));
-        let help = format!("the artwork has: {}", listed(there, &layer.select));
-        let span = self.source.span_of(&[&format!("layer[{index}].select")]);
-        Err(JobError::UnknownName(self.source.fault(span, &message, &label, &help)))
-    }
-
-    /// A layer that stands by itself must not be asked to rise out of the stock, unless a later layer may
-    /// lower it again. What the surfaces really reach is checked when they are made.
-    fn check_heights(&self, layers: &[LayerSpec]) -> Result<(), JobError> {
-        for (index, layer) in layers.iter().enumerate() {
-            let alone = matches!(layer.combine, Combine::Base | Combine::Max | Combine::Replace);
-            let lowered = layers[index + 1..].iter().any(|later| {
-                matches!(
-                    later.combine,
-                    Combine::Min
-                        | Combine::Multiply
-                        | Combine::Subtract
-                        | Combine::Replace
-                        | Combine::Base
-                )
-            });
-            let top = layer.height_mm.max(layer.base_mm) + layer.offset_mm;
-            if alone && !lowered && top > self.depth_mm + TOUCHING_MM {
-                let message = format!(
-                    "layer '{}' would rise {} mm above the stock: it is {} mm high, the background lies {} mm deep",
-                    layer.name,
-                    round(top - self.depth_mm),
-                    round(top),
-                    self.depth_mm
-                );
-                let paths = ["height_mm", "base_mm", "offset_mm"]
-                    .map(|key| format!("layer[{index}].{key}"));
-                let paths: Vec<&str> =
-                    paths.iter().map(String::as_str).chain(["relief.depth_mm"]).collect();
-                let help = "lower the layer or raise relief.depth_mm";
-                return Err(self.impossible(&paths, &message, help));
-            }
-        }
-        Ok(())
-    }
-
-    fn operations(
-        &self,
-        stock: &Stock,
-        pitch_mm: f64,
-        notes: &mut Vec<String>,
-    ) -> Result<Vec<Operation>, JobError> {
-        if self.operations.first().is_some_and(|op| op.kind == KindDraft::Raster) {
-            notes.push(
-                "no roughing comes before the finishing passes: they cut the full depth at once"
-                    .to_owned(),
-            );
-        }
-        self.operations
-            .iter()
-            .enumerate()
-            .map(|(index, draft)| self.operation(index, draft, stock, pitch_mm, notes))
-            .collect()
-    }
-
-    fn operation(
-        &self,
-        index: usize,
-        draft: &OperationDraft,
-        stock: &Stock,
-        pitch_mm: f64,
-        notes: &mut Vec<String>,
-    ) -> Result<Operation, JobError> {
-        let path = |key: &str| format!("operation[{index}].{key}");
-        let refuse = |keys: &[&str], message: &str, help: &str| {
-            let paths: Vec<String> = keys.iter().map(|key| path(key)).collect();
-            let mut paths: Vec<&str> = paths.iter().map(String::as_str).collect();
-            let whole = format!("operation[{index}]");
-            paths.push(&whole);
-            Err(self.impossible(&paths, message, help))
-        };
-        let cutter = &draft.cutter;
-        let diameter = cutter.diameter_mm;
-        if diameter > stock.width_mm.min(stock.height_mm) {
-            let message = format!(
-                "cutter {} is {diameter} mm wide, wider than the stock ({} x {} mm)",
-                cutter.name, stock.width_mm, stock.height_mm
-            );
-            return refuse(&["cutter"], &message, "take a smaller cutter");
-        }
-        if diameter < 2.0 * pitch_mm {
-            let message = format!(
-                "cutter {} is {diameter} mm wide, too fine for a heightfield of pitch {pitch_mm} mm",
-                cutter.name
-            );
-            let help = format!(
-                "set relief.pitch_mm to {} or less, or take a larger cutter",
-                diameter / 2.0
-            );
-            return refuse(&["cutter"], &message, &help);
-        }
-        let wanted = Wanted {
-            feed_mm_per_min: draft.feed_mm_per_min,
-            plunge_mm_per_min: draft.plunge_mm_per_min,
-            spindle_rpm: draft.spindle_rpm,
-        };
-        let machine = &self.machine;
-        let limits = [
-            (
-                "feed_mm_per_min",
-                wanted.feed_mm_per_min,
-                0.0,
-                speeds::feed_limit_mm_per_min(machine),
-                "mm/min",
-            ),
-            (
-                "plunge_mm_per_min",
-                wanted.plunge_mm_per_min,
-                0.0,
-                machine.max_rate_mm_per_min.z,
-                "mm/min",
-            ),
-            (
-                "spindle_rpm",
-                wanted.spindle_rpm,
-                machine.spindle_min_rpm,
-                machine.spindle_max_rpm,
-                "1/min",
-            ),
-        ];
-        for (key, value, min, max, unit) in limits {
-            if let Some(value) = value.filter(|value| *value < min || *value > max) {
-                let message = format!("{} cannot do {key} {value}", machine.title);
-                let help = format!("give a value from {min} to {max} {unit}, or none");
-                return refuse(&[key], &message, &help);
-            }
-        }
-        let found = speeds::find(wanted, &stock.wood, cutter, machine);
-        self.note_chip_load(draft, &stock.wood, found, notes);
-        if draft.stepover_mm.is_some_and(|stepover| stepover > diameter) {
-            let message =
-                format!("passes further apart than the cutter is wide ({diameter} mm) leave ribs");
-            return refuse(&["stepover_mm"], &message, &format!("give {diameter} or less"));
-        }
-        let angle_rad = draft.angle_rad.unwrap_or(stock.grain_rad);
-        let kind = match draft.kind {
-            KindDraft::Rough => {
-                let stepdown_mm = draft.stepdown_mm.unwrap_or_else(|| {
-                    (stock.wood.stepdown_per_diameter * diameter).min(cutter.flute_mm)
-                });
-                if stepdown_mm > cutter.flute_mm {
-                    let message = format!(
-                        "levels of {stepdown_mm} mm are deeper than the flutes of {} ({} mm)",
-                        cutter.name, cutter.flute_mm
-                    );
-                    return refuse(
-                        &["stepdown_mm"],
-                        &message,
-                        "give less, or take a longer cutter",
-                    );
-                }
-                OperationKind::Rough {
-                    leave_mm: draft.leave_mm,
-                    stepdown_mm,
-                    stepover_mm: draft.stepover_mm.unwrap_or(rule::ROUGH_STEPOVER * diameter),
-                    angle_rad,
-                }
-            }
-            KindDraft::Raster => {
-                let stepover = match (draft.stepover_mm, draft.scallop_mm, cutter.shape) {
-                    (Some(plan), _, _) => Stepover::Plan(plan),
-                    (None, _, CutterShape::Flat) => Stepover::Plan(rule::FLAT_STEPOVER * diameter),
-                    (None, scallop, CutterShape::Ball) => {
-                        let scallop = scallop.unwrap_or(self.tolerance.scallop_mm);
-                        if scallop >= diameter / 2.0 {
-                            let message = format!(
-                                "cusps of {scallop} mm are higher than the radius of {}",
-                                cutter.name
-                            );
-                            return refuse(&["scallop_mm", "cutter"], &message, "0.01 is usual");
-                        }
-                        Stepover::Scallop(scallop)
-                    }
-                };
-                OperationKind::Raster { stepover, angle_rad }
-            }
-        };
-        Ok(Operation {
-            kind,
-            cutter: cutter.clone(),
-            feed_mm_per_min: found.feed_mm_per_min,
-            plunge_mm_per_min: found.plunge_mm_per_min,
-            spindle_rpm: found.spindle_rpm,
-        })
-    }
-
-    /// Tells when a speed of the job's own makes chips twice as thick, or half as thick, as the wood likes.
-    fn note_chip_load(
-        &self,
-        draft: &OperationDraft,
-        wood: &super::types::Wood,
-        found: speeds::Speeds,
-        notes: &mut Vec<String>,
-    ) {
-        let usual = speeds::chip_load_mm(wood, &draft.cutter);
-        let chip = found.feed_mm_per_min / (found.spindle_rpm * f64::from(draft.cutter.flutes));
-        if chip > 2.0 * usual || chip < 0.5 * usual {
-            notes.push(format!(
-                "{} at {} mm/min and {} 1/min on {} takes chips of {chip:.3} mm; {} likes about {usual:.3} mm",
-                draft.cutter.name,
-                found.feed_mm_per_min,
-                found.spindle_rpm,
-                self.machine.title,
-                wood.title
-            ));
-        }
-    }
-}
-
-/// One layer for each layer found; those without a name get the name of their colour.
-fn default_layers(found: &[FoundLayer]) -> Vec<LayerDraft> {
-    let mut names: Vec<String> = Vec::new();
-    found
-        .iter()
-        .map(|layer| {
-            let name = unique(&layer_name(layer), &names);
-            names.push(name.clone());
-            default_layer(layer.select.clone(), name)
-        })
-        .collect()
-}
-
-fn layer_name(layer: &FoundLayer) -> String {
-    match &layer.select {
-        _ if !layer.name.trim().is_empty() => layer.name.trim().to_owned(),
-        Selector::Fill(color) => colors::swatch_name(*color).to_owned(),
-        Selector::Stroke(color) => format!("{} line", colors::swatch_name(*color)),
-        other => other.to_string(),
-    }
-}
-
-/// `name`, or `name 2`, `name 3`, ... when it is taken.
-fn unique(name: &str, taken: &[String]) -> String {
-    let is_free = |wanted: &str| taken.iter().all(|one| one != wanted);
-    if is_free(name) {
-        return name.to_owned();
-    }
-    (2..)
-        .map(|number| format!("{name} {number}"))
-        .find(|wanted| is_free(wanted))
-        .expect("one of more names than there are layers is free")
-}
-
-/// Height of layer `index` of `count` when it is not given: in even steps from 40 % to 100 % of the
-/// depth less the headroom (of half the depth when the relief is shallower than twice the headroom).
-fn stepped_height_mm(index: usize, count: usize, depth_mm: f64) -> f64 {
-    let top = (depth_mm - rule::HEADROOM_MM).max(depth_mm * 0.5);
-    let part = if count > 1 { index as f64 / (count - 1) as f64 } else { 1.0 };
-    let height = top * (rule::LOWEST_LAYER + (1.0 - rule::LOWEST_LAYER) * part);
-    let steps = (1.0 / rule::HEIGHT_STEP_MM).round();
-    ((height * steps + 1e-6).floor() / steps).max(rule::HEIGHT_STEP_MM)
-}
-
-/// The selector that was most likely meant: for a colour the nearest colour, for a name the nearest name.
-fn nearest_selector(wrong: &Selector, there: &[Selector]) -> Option<Selector> {
-    let fills =
-        || there.iter().filter_map(|s| if let Selector::Fill(c) = s { Some(*c) } else { None });
-    let strokes =
-        || there.iter().filter_map(|s| if let Selector::Stroke(c) = s { Some(*c) } else { None });
-    match wrong {
-        Selector::Fill(color) => colors::nearest_color(*color, fills()).map(Selector::Fill),
-        Selector::Stroke(color) => colors::nearest_color(*color, strokes()).map(Selector::Stroke),
-        _ => {
-            let names: Vec<String> = there.iter().map(ToString::to_string).collect();
-            let near = super::error::nearest(&wrong.to_string(), names.iter().map(String::as_str))?;
-            there.iter().find(|selector| selector.to_string() == near).cloned()
-        }
-    }
-}
-
-/// What the artwork has of the kind of `wrong`, at most a dozen.
-fn listed(there: &[Selector], wrong: &Selector) -> String {
-    const MOST: usize = 12;
-    let kind = std::mem::discriminant(wrong);
-    let same = there.iter().filter(|selector| std::mem::discriminant(*selector) == kind);
-    let names: Vec<String> = same.map(ToString::to_string).collect();
-    match names.len() {
-        0 => {
-            let others: Vec<String> = there.iter().take(MOST).map(ToString::to_string).collect();
-            others.join(", ")
-        }
-        count if count > MOST => format!("{}, and {} more", names[..MOST].join(", "), count - MOST),
-        _ => names.join(", "),
-    }
 }
 
 /// File name without folders and ending.
@@ -629,7 +298,7 @@ fn stem(file: &str) -> String {
     if stem.trim().is_empty() { "carving".to_owned() } else { stem.to_owned() }
 }
 
-/// For messages: three decimals.
-fn round(mm: f64) -> f64 {
+/// Three decimals: enough for people, and for what a rule of thumb gives.
+pub(super) fn round(mm: f64) -> f64 {
     (mm * 1000.0).round() / 1000.0
 }

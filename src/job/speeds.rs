@@ -46,7 +46,8 @@ pub(super) fn feed_limit_mm_per_min(machine: &Machine) -> f64 {
 /// bites, the spindle slows down (as far as it can), so that the cutter goes on cutting chips, not dust.
 pub(super) fn find(wanted: Wanted, wood: &Wood, cutter: &CutterSpec, machine: &Machine) -> Speeds {
     let per_turn = chip_load_mm(wood, cutter) * f64::from(cutter.flutes);
-    let rpm_range = |rpm: f64| rpm.max(machine.spindle_min_rpm).min(machine.spindle_max_rpm);
+    let slowest = machine.spindle_min_rpm.max(rule::SLOWEST_RPM);
+    let rpm_range = |rpm: f64| rpm.max(slowest).min(machine.spindle_max_rpm);
     let mut spindle_rpm = wanted.spindle_rpm.unwrap_or_else(|| rpm_range(rule::SPINDLE_RPM));
     let limit = feed_limit_mm_per_min(machine);
     let feed_mm_per_min = wanted.feed_mm_per_min.unwrap_or_else(|| {
