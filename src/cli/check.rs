@@ -1,0 +1,1 @@
+//! `relievo check JOB.toml`: reads and checks everything, writes nothing.

@@ -1,0 +1,169 @@
+//! Reading inputs and writing outputs. Outputs of one run appear together or not at all.
+
+use anyhow::{Context, Result, bail};
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// Largest input file taken on, bytes.
+const LARGEST_INPUT: u64 = 512 << 20;
+
+/// Reads a whole input file.
+pub(super) fn read(path: &Path) -> Result<Vec<u8>> {
+    let meta = fs::metadata(path)
+        .with_context(|| format!("cannot read {}", path.display()))?;
+    if meta.is_dir() {
+        bail!("{} is a folder; give a file", path.display());
+    }
+    if meta.len() > LARGEST_INPUT {
+        bail!("{} has {} MiB, more than the {} MiB that are read; simplify it", path.display(),
+            meta.len() >> 20, LARGEST_INPUT >> 20);
+    }
+    fs::read(path).with_context(|| format!("cannot read {}", path.display()))
+}
+
+/// Reads a whole text file.
+pub(super) fn read_text(path: &Path) -> Result<String> {
+    let bytes = read(path)?;
+    match String::from_utf8(bytes) {
+        Ok(text) => Ok(text),
+        Err(e) => {
+            let upto = e.utf8_error().valid_up_to();
+            let line = e.as_bytes()[..upto].iter().filter(|b| **b == b'\n').count() + 1;
+            bail!("{}:{line}: not UTF-8 text; save the file as UTF-8", path.display())
+        }
+    }
+}
+
+/// The files of one run, gathered in a folder beside their destination and moved in at the end.
+#[derive(Debug)]
+pub(super) struct Outputs {
+    folder: PathBuf,
+    staging: PathBuf,
+    made_folder: bool,
+    names: Vec<String>,
+    committed: bool,
+}
+
+impl Outputs {
+    /// Prepares `folder` (made when missing); fails when it cannot be written.
+    pub(super) fn prepare(folder: &Path) -> Result<Self> {
+        let made_folder = !folder.exists();
+        let cure = || format!("cannot write into {}; choose another folder with --out", folder.display());
+        fs::create_dir_all(folder).with_context(cure)?;
+        let staging = folder.join(format!(".relievo-{}", std::process::id()));
+        let outputs = Self {
+            folder: folder.to_path_buf(),
+            staging: staging.clone(),
+            made_folder,
+            names: Vec::new(),
+            committed: false,
+        };
+        fs::create_dir(&staging).with_context(cure)?;
+        Ok(outputs)
+    }
+
+    /// Adds one file.
+    pub(super) fn add(&mut self, name: &str, bytes: &[u8]) -> Result<()> {
+        let path = self.staging.join(name);
+        let write = || -> std::io::Result<()> {
+            use std::io::Write;
+            let mut file = fs::File::create(&path)?;
+            file.write_all(bytes)?;
+            file.sync_all()
+        };
+        write().with_context(|| format!("cannot write {name} into {}", self.folder.display()))?;
+        self.names.push(name.to_string());
+        Ok(())
+    }
+
+    /// Moves all files in and takes away programs of an earlier run that this one did not make, so that
+    /// the folder never holds programs of two different jobs.
+    pub(super) fn commit(mut self) -> Result<()> {
+        for name in &self.names {
+            let to = self.folder.join(name);
+            if to.is_dir() {
+                bail!("{} is a folder; move it away", to.display());
+            }
+        }
+        for stale in self.programs_of_earlier_runs()? {
+            fs::remove_file(&stale)
+                .with_context(|| format!("cannot remove the old program {}", stale.display()))?;
+        }
+        for name in &self.names {
+            let to = self.folder.join(name);
+            fs::rename(self.staging.join(name), &to)
+                .with_context(|| format!("cannot write {}", to.display()))?;
+        }
+        fs::remove_dir_all(&self.staging).ok();
+        self.committed = true;
+        Ok(())
+    }
+
+    fn programs_of_earlier_runs(&self) -> Result<Vec<PathBuf>> {
+        let mut stale = Vec::new();
+        for entry in fs::read_dir(&self.folder)
+            .with_context(|| format!("cannot list {}", self.folder.display()))?
+        {
+            let path = entry?.path();
+            let name = path.file_name().and_then(|n| n.to_str()).unwrap_or_default();
+            let ours = path.extension().is_some_and(|e| e == "nc")
+                && name.starts_with(|c: char| c.is_ascii_digit())
+                && starts_with_our_header(&path);
+            if ours && !self.names.iter().any(|n| n == name) {
+                stale.push(path);
+            }
+        }
+        stale.sort();
+        Ok(stale)
+    }
+}
+
+fn starts_with_our_header(path: &Path) -> bool {
+    use std::io::Read;
+    let mut head = [0; 9];
+    fs::File::open(path).and_then(|mut f| f.read_exact(&mut head)).is_ok() && &head == b"(relievo "
+}
+
+impl Drop for Outputs {
+    fn drop(&mut self) {
+        if !self.committed {
+            fs::remove_dir_all(&self.staging).ok();
+            if self.made_folder {
+                fs::remove_dir(&self.folder).ok(); // only when empty
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn outputs_that_are_not_committed_leave_nothing() {
+        let dir = tempfile::tempdir().unwrap();
+        let folder = dir.path().join("out");
+        let mut out = Outputs::prepare(&folder).unwrap();
+        out.add("a.txt", b"a").unwrap();
+        drop(out);
+        assert!(!folder.exists());
+    }
+
+    #[test]
+    fn programs_of_an_earlier_run_go_and_foreign_files_stay() {
+        let dir = tempfile::tempdir().unwrap();
+        let write = |n: &str, t: &str| fs::write(dir.path().join(n), t).unwrap();
+        write("3-old.nc", "(relievo 0.1.0)\nG21\n");
+        write("4-mine.nc", "(by hand)\nG21\n");
+        write("notes.txt", "keep");
+        let mut out = Outputs::prepare(dir.path()).unwrap();
+        out.add("1-new.nc", b"(relievo 0.1.0)\n").unwrap();
+        out.commit().unwrap();
+        let mut names: Vec<_> = fs::read_dir(dir.path())
+            .unwrap()
+            .map(|e| e.unwrap().file_name().into_string().unwrap())
+            .collect();
+        names.sort();
+        assert_eq!(names, ["1-new.nc", "4-mine.nc", "notes.txt"]);
+    }
+}
