@@ -13,7 +13,7 @@
 pub(crate) mod boolean;
 mod clip;
 mod colour_name;
-mod found;
+pub(crate) mod curve;
 mod place;
 mod read;
 mod source;

@@ -130,3 +130,6 @@ pub enum OutlineError {
         why: String,
     },
 }
+
+#[cfg(test)]
+mod tests;

@@ -5,7 +5,7 @@ use std::collections::HashSet;
 use kurbo::Affine;
 
 use super::boolean;
-use super::{Artwork, ArtworkError, FoundLayer, Part, Placed, Shape, clip, colour_name};
+use super::{Artwork, ArtworkError, FoundLayer, Part, Placed, Shape, colour_name, curve};
 use crate::geom::DVec2;
 use crate::job::{LayerSpec, Rgb, Selector};
 
@@ -108,8 +108,8 @@ fn paint(shape: &Shape) -> Selector {
 
 /// Area that a shape paints, in its units squared.
 fn area(shape: &Shape, tolerance: f64) -> f64 {
-    clip::grid([&shape.curve].into_iter()).map_or(0.0, |grid| {
-        boolean::area(&grid, &clip::resolved(&shape.curve, shape.rule, &grid, tolerance))
+    curve::grid_round([&shape.curve].into_iter()).map_or(0.0, |grid| {
+        boolean::area(&grid, &curve::resolved(&shape.curve, shape.rule, &grid, tolerance))
     })
 }
 

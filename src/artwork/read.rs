@@ -7,7 +7,7 @@ use kurbo::{Affine, BezPath, PathEl};
 
 use super::clip::{self, Clip};
 use super::source::{self, Source};
-use super::{Artwork, ArtworkError, FillRule, Fonts, Part, Shape, stroke};
+use super::{Artwork, ArtworkError, FillRule, Fonts, Part, Shape, curve, stroke};
 use crate::geom::Bounds;
 use crate::job::Rgb;
 use odd::{Odd, Odds};
@@ -96,7 +96,7 @@ impl Walker<'_> {
     fn group(&mut self, group: &usvg::Group, outer: &Scope) -> Result<(), ArtworkError> {
         let mut scope = outer.clone();
         scope.element = self.known(group.id()).or(outer.element);
-        scope.at = outer.at * clip::affine(group.transform());
+        scope.at = outer.at * curve::affine(group.transform());
         let name = self.name(scope.element);
         if let Some(path) = group.clip_path() {
             scope.clips.push(Clip::of(path, scope.at));
@@ -129,7 +129,7 @@ impl Walker<'_> {
     fn path(&mut self, path: &usvg::Path, scope: &Scope) -> Result<(), ArtworkError> {
         let element = self.known(path.id()).or(scope.element);
         let name = self.name(element);
-        let curve = clip::curve(path.data());
+        let curve = curve::curve(path.data());
         self.check_extent(&(scope.at * curve.clone()), &name)?;
         let fill = path.fill().filter(|_| has_area(&curve));
         if fill.is_none() && path.stroke().is_none() {
@@ -164,8 +164,8 @@ impl Walker<'_> {
         let name = self.name(element);
         let color = self.paint(fill.paint(), fill.opacity().get(), scope, &name);
         if let Some(color) = color {
-            let curve = scope.at * clip::closed(curve);
-            self.add(Part::Fill, curve, clip::rule(fill.rule()), color, scope, element);
+            let curve = scope.at * curve::closed(curve);
+            self.add(Part::Fill, curve, curve::rule(fill.rule()), color, scope, element);
         }
     }
 
