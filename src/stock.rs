@@ -22,7 +22,9 @@ pub struct Contact {
 }
 
 impl Contact {
-    fn worst(self, other: Self) -> Self {
+    /// The larger of both, figure by figure.
+    #[must_use]
+    pub fn worst(self, other: Self) -> Self {
         Self {
             deepest_mm: self.deepest_mm.max(other.deepest_mm),
             engaged_mm: self.engaged_mm.max(other.engaged_mm),
