@@ -48,7 +48,7 @@ pub fn merge(
     check(job, outlines, &surfaces)?;
     let mut notes = Vec::new();
     let layers = prepare(job, outlines, surfaces, grid, &mut notes)?;
-    let ground = Ground::of(job, outlines, *grid);
+    let ground = Ground::of(job, outlines);
     let mut z = vec![0.0_f32; grid.len()];
     let mut marks = vec![0_u16; grid.len()];
     let finds: Vec<Find> = z
@@ -366,21 +366,17 @@ struct Ground {
 }
 
 impl Ground {
-    fn of(job: &Job, outlines: &Outlines, grid: Grid) -> Self {
+    fn of(job: &Job, outlines: &Outlines) -> Self {
         let rings = || {
             let figures = outlines.layers.iter().flat_map(|l| &l.figures);
             figures.flat_map(|f| &f.regions).flat_map(crate::outline::Region::rings)
         };
         let leave = matches!(job.relief.background, Background::Leave(_));
-        let mut stock = job.stock.bounds();
-        if stock.is_empty() {
-            stock = grid.bounds();
-        }
         Self {
             depth_mm: job.relief.depth_mm,
             thickness_mm: job.stock.thickness_mm,
             background: job.relief.background,
-            stock,
+            stock: job.stock.bounds(),
             outlines: if leave { Segments::of_rings(rings()) } else { Segments::default() },
         }
     }
@@ -414,7 +410,7 @@ impl Ground {
     /// For each node of the band: does `leave` keep the stock there? Empty for other backgrounds.
     fn left(&self, band: &Band) -> Vec<bool> {
         let Background::Leave(reach_mm) = self.background else { return Vec::new() };
-        // Distance in units of the reach; covered nodes are not asked for.
+        // Nodes to ask for are NaN; then 1 beyond the reach, 0 within it or covered.
         let mut far: Vec<f32> =
             band.marks.iter().map(|m| if m & COVERED == 0 { f32::NAN } else { 0.0 }).collect();
         let beyond = |d: f64| if d > reach_mm { 1.0 } else { 0.0 };
