@@ -10,7 +10,7 @@ use crate::cutter::Profile;
 use crate::geom::{DVec2, Grid, Heightfield, Move};
 use crate::job::Stock;
 use rayon::prelude::*;
-use sweep::{SPAN_SLACK_MM, Sweep, Tip};
+use sweep::{Joint, SPAN_SLACK_MM, Sweep, Tip};
 
 /// What a move met.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -51,6 +51,9 @@ pub struct Block {
 
 /// Rows of nodes that one task carves.
 const BAND_ROWS: usize = 64;
+
+/// Widest wedge at a joint that counts as thin, nodes.
+const THIN_NODES: f64 = 2.0;
 
 /// Less than this removed at a node does not count as engagement, mm (rounding of the stored heights).
 const ENGAGED_FROM_MM: f64 = 1e-3;
@@ -101,13 +104,18 @@ impl Block {
     ) -> Vec<Contact> {
         let mut contacts = vec![Contact::default(); moves.len()];
         let tip = Tip::of(profile);
-        let joint = |k: usize| {
-            k > 0
-                && k < moves.len()
-                && !alone(k - 1)
-                && !alone(k)
-                && sweep::joined(&moves[k - 1], &moves[k])
-        };
+        // A wedge up to a few nodes wide costs less as part of a strip than as a stamp of its own.
+        let thin_mm = THIN_NODES * self.field.grid().pitch_mm;
+        let joints: Vec<Joint> = (0..moves.len() + 1)
+            .into_par_iter()
+            .with_min_len(1024)
+            .map(|k| match (k.checked_sub(1), moves.get(k)) {
+                (Some(i), Some(next)) if !alone(i) && !alone(k) => {
+                    Joint::of(&moves[i], next, tip, thin_mm)
+                }
+                _ => Joint::None,
+            })
+            .collect();
         let grid = *self.field.grid();
         let top_mm = self.top_mm;
         let bins = self.bins(tip.radius, moves);
@@ -123,9 +131,9 @@ impl Block {
                 for k in bin {
                     let i = k as usize;
                     let mut contact = Contact::default();
-                    let ends = [joint(i), joint(i + 1)];
+                    let ends = [joints[i], joints[i + 1]];
                     band.carve(&Sweep::of(&moves[i], tip, ends), &mut contact);
-                    if ends[1]
+                    if ends[1] == Joint::Wedge
                         && moves[i].to.z < top_mm
                         && let Some(wedge) = Sweep::wedge(&moves[i], &moves[i + 1], tip)
                     {
@@ -192,7 +200,7 @@ impl Block {
             return None;
         }
         let grid = self.field.grid();
-        let sweep = Sweep::of(mv, Tip::of(&Profile::Flat { radius_mm }), [false, false]);
+        let sweep = Sweep::of(mv, Tip::of(&Profile::Flat { radius_mm }), [Joint::None; 2]);
         let (lo, hi) = sweep.y_range();
         let (j0, j1) = rows(grid, lo, hi, 0, grid.ny)?;
         let mut worst: Option<Touch> = None;
@@ -286,12 +294,14 @@ fn columns(grid: &Grid, lo: f64, hi: f64) -> Option<(usize, usize)> {
 /// The whole numbers in `lo..=hi` that are in `from..to`, as first and last.
 #[inline]
 fn index_range(lo: f64, hi: f64, from: usize, to: usize) -> Option<(usize, usize)> {
-    // A float cast saturates, so that infinities end at the border.
-    let first = (lo.max(from as f64).ceil() as usize).max(from);
+    // Casts saturate and drop the fraction: a grid has far fewer than 2^31 rows and columns. Rounding up by
+    // hand, for ceil() is a call on plain x86-64.
+    let below = lo.max(from as f64) as i32;
+    let first = below as usize + usize::from(f64::from(below) < lo);
     if hi < first as f64 || first >= to {
         return None;
     }
-    Some((first, (hi as usize).min(to - 1)))
+    Some((first, (hi as i32 as usize).min(to - 1)))
 }
 
 #[cfg(test)]
