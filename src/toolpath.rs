@@ -127,7 +127,7 @@ pub enum ToolpathError {
 }
 
 /// Most points that one operation may compute.
-const MOST_SAMPLES: f64 = 4e8;
+const MOST_SAMPLES: f64 = 1e8;
 
 /// What an operation is planned for.
 struct Site<'a> {
@@ -201,7 +201,7 @@ pub fn plan(
                 raster::raster(&site, stepover, angle_rad, &mut block, &mut out)?;
             }
         }
-        for note in notes(&site, out.moves()) {
+        for note in notes(&site, &out) {
             observe(PlanEvent::Note(note));
         }
         join(&mut paths, operation, out.into_moves(), job);
@@ -241,24 +241,31 @@ fn kind_name(operation: &Operation) -> &'static str {
 }
 
 /// What the user should know of an operation's moves.
-fn notes(site: &Site, moves: &[Move]) -> Vec<String> {
-    let (number, cutter) = (site.number, &site.operation.cutter);
-    let kind = kind_name(site.operation);
+fn notes(site: &Site, out: &Emitter) -> Vec<String> {
+    let cutter = &site.operation.cutter;
+    let who = format!("operation {} ({}, {})", site.number, kind_name(site.operation), cutter.name);
+    let mut notes = Vec::new();
+    let moves = out.moves();
     if moves.is_empty() {
-        return vec![format!(
-            "operation {number} ({kind}, {}): nothing to cut: the cutter fits nowhere or no wood is in its way",
-            cutter.name
-        )];
+        notes.push(format!(
+            "{who}: nothing to cut: the cutter fits nowhere or no wood is in its way"
+        ));
     }
-    let depth = -moves.iter().map(|m| m.to.z).fold(f64::INFINITY, f64::min);
-    if depth <= cutter.flute_mm {
-        return Vec::new();
+    if out.skipped() > 0 {
+        let n = out.skipped();
+        notes.push(format!(
+            "{who}: {n} places are too small to ramp into and stay uncut; take a thinner cutter"
+        ));
     }
-    vec![format!(
-        "operation {number} ({kind}, {}): cuts {depth:.2} mm below the stock's top, but the flutes are only {} mm long; \
-         wood beside the cutter must be cleared first, or take a longer cutter",
-        cutter.name, cutter.flute_mm
-    )]
+    let depth = moves.iter().map(|m| -m.to.z).fold(0.0, f64::max);
+    if depth > cutter.flute_mm {
+        notes.push(format!(
+            "{who}: cuts {depth:.2} mm below the stock's top, but the flutes are only {} mm long; \
+             the wood beside it must be cleared first, or take a longer cutter",
+            cutter.flute_mm
+        ));
+    }
+    notes
 }
 
 /// Puts an operation's moves into the last program when cutter and speed are the same, else into a new one.

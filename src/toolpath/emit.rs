@@ -18,11 +18,13 @@ pub(super) struct Emitter<'a> {
     job: &'a Job,
     operation: &'a Operation,
     moves: Vec<Move>,
+    /// Chains left out because they have no room to ramp.
+    skipped: usize,
 }
 
 impl<'a> Emitter<'a> {
     pub(super) fn new(job: &'a Job, operation: &'a Operation) -> Self {
-        Self { job, operation, moves: Vec::new() }
+        Self { job, operation, moves: Vec::new(), skipped: 0 }
     }
 
     /// The moves so far: they start and end at safe Z.
@@ -30,17 +32,23 @@ impl<'a> Emitter<'a> {
         &self.moves
     }
 
+    /// Number of chains left out.
+    pub(super) fn skipped(&self) -> usize {
+        self.skipped
+    }
+
     pub(super) fn into_moves(self) -> Vec<Move> {
         self.moves
     }
 
     /// Goes to the start of the chain at safe Z, enters, cuts, retracts. `wood_mm`: the highest wood under the
-    /// cutter at the start. False (and nothing done) when the chain has no room to ramp.
-    pub(super) fn chain(&mut self, chain: &[DVec3], wood_mm: f64) -> bool {
+    /// cutter at the start. A chain without room to ramp is only counted.
+    pub(super) fn chain(&mut self, chain: &[DVec3], wood_mm: f64) {
         let ramp_z =
             (wood_mm + RAMP_GAP_MM).max(chain[0].z).min(self.job.safe_z_mm.max(chain[0].z));
         let Some(entry) = ramp_onto(chain, ramp_z, libm::tan(self.job.ramp_rad)) else {
-            return false;
+            self.skipped += 1;
+            return;
         };
         let above = on_program_grid(entry[0].with_z(self.job.safe_z_mm));
         match self.moves.last() {
@@ -55,7 +63,6 @@ impl<'a> Emitter<'a> {
             at = self.feed(at, on_program_grid(p));
         }
         self.rapid(at, at.with_z(above.z));
-        true
     }
 
     fn rapid(&mut self, from: DVec3, to: DVec3) {

@@ -187,3 +187,63 @@ fn lies_between(path: &[Sample], roof: &[f64], fitted: &[Sample]) -> bool {
         y >= p.z - 1e-7 && y <= roof + 1e-7
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn path(f: impl Fn(f64) -> f64, to: f64, n: usize) -> Vec<Sample> {
+        (0..=n).map(|k| to * k as f64 / n as f64).map(|s| Sample { s, z: f(s) }).collect()
+    }
+
+    #[test]
+    fn a_straight_path_is_one_segment() {
+        let straight = path(|s| 0.3 * s - 2.0, 50.0, 500);
+        assert_eq!(fit(&straight, 0.004), [straight[0], straight[500]]);
+        assert_eq!(fit(&straight[..2], 0.004), straight[..2]);
+        assert_eq!(fit(&straight[..1], 0.004), straight[..1]);
+    }
+
+    #[test]
+    fn arcs_need_as_few_segments_as_the_tunnel_allows() {
+        // A line in the ring between radii R and R + f (or R - f) is at most 2 sqrt(2 R f) long.
+        for sign in [1.0, -1.0] {
+            let arc = path(|s| sign * (20.0 - (400.0 - (s - 5.0) * (s - 5.0)).sqrt()), 10.0, 2000);
+            let least = 10.1 / (2.0 * (2.0 * 20.0 * 0.004_f64).sqrt());
+            let segments = (fit(&arc, 0.004).len() - 1) as f64;
+            assert!(segments <= least.ceil() + 2.0, "{segments} of {least}");
+            assert!(segments >= least.floor(), "{segments} of {least}: outside the tunnel");
+        }
+    }
+
+    #[test]
+    fn without_tolerance_every_bend_stays() {
+        let zigzag = path(|s| f64::from(u8::from(s as u32 % 2 == 0)), 10.0, 10);
+        assert_eq!(fit(&zigzag, 0.0).len(), 11);
+    }
+
+    proptest! {
+        #[test]
+        fn it_stays_between_the_samples_and_the_roof(
+            zs in prop::collection::vec(-0.05f64..0.05, 3..120), step in 0.001f64..0.3, fit_mm in 0.0f64..0.05,
+            steepness in prop::sample::select(vec![1.0, 50.0]),
+        ) {
+            let samples: Vec<Sample> = zs
+                .iter()
+                .enumerate()
+                .map(|(k, &z)| Sample { s: k as f64 * step, z: z * steepness })
+                .collect();
+            let fitted = fit(&samples, fit_mm);
+            prop_assert_eq!(fitted[0], samples[0]);
+            prop_assert_eq!(fitted[fitted.len() - 1], samples[samples.len() - 1]);
+            let roof = roof(&samples, fit_mm);
+            for (k, p) in samples.iter().enumerate() {
+                let n = fitted.partition_point(|q| q.s < p.s).clamp(1, fitted.len() - 1);
+                let (a, b) = (fitted[n - 1], fitted[n]);
+                let y = a.z + (b.z - a.z) * (p.s - a.s) / (b.s - a.s);
+                prop_assert!(y >= p.z - 1e-7 && y <= roof[k] + 1e-7, "{y} at sample {k}: {}", p.z);
+            }
+        }
+    }
+}

@@ -9,22 +9,26 @@
 
 use crate::geom::DVec3;
 
+/// More passes to and fro than this mean that there is no room.
+const MOST_PASSES: f64 = 1000.0;
+
 /// Points from above `path[0]` (at height `start_z`) to `path[0]`, both included.
 ///
 /// The path's first stretch is used, about half as long as the descent needs, so that it ends near the
 /// first point. Every point is on or above the path; until the path is touched no piece goes down by more
 /// than `slope` per unit of way in plan, and from then on it follows the path itself.
-/// `None` when the whole path has no length in plan: there is no room to ramp.
+/// `None` when the whole path is so short in plan that it would be passed a thousand times: no room to ramp.
 pub(super) fn ramp_onto(path: &[DVec3], start_z: f64, slope: f64) -> Option<Vec<DVec3>> {
     let start = path[0].with_z(start_z.max(path[0].z));
     let drop = start.z - path[0].z;
-    let stretch = stretch(path, drop / slope * 0.5);
-    if plan_distance(path[0], path[path.len() - 1]) == 0.0 && !moves_in_plan(path) {
-        return None;
-    }
     let mut out = vec![start];
     if drop == 0.0 {
         return Some(out);
+    }
+    let stretch = stretch(path, drop / slope * 0.5);
+    let length: f64 = stretch.windows(2).map(|e| plan_distance(e[0], e[1])).sum();
+    if length * MOST_PASSES < drop / slope {
+        return None;
     }
     let mut z = start.z;
     let last = stretch.len() - 1;
@@ -55,10 +59,6 @@ pub(super) fn ramp_onto(path: &[DVec3], start_z: f64, slope: f64) -> Option<Vec<
 
 fn plan_distance(a: DVec3, b: DVec3) -> f64 {
     a.truncate().distance(b.truncate())
-}
-
-fn moves_in_plan(path: &[DVec3]) -> bool {
-    path.windows(2).any(|e| plan_distance(e[0], e[1]) > 0.0)
 }
 
 /// The first `length` of the path in plan, at least half a millimetre, at most all of it.
@@ -112,6 +112,7 @@ mod tests {
     #[test]
     fn a_point_has_no_room() {
         assert_eq!(ramp_onto(&[DVec3::ZERO, DVec3::ZERO], 1.0, 0.1), None);
+        assert_eq!(ramp_onto(&[DVec3::ZERO, DVec3::X * 1e-9], 1.0, 0.1), None);
     }
 
     /// Height of the path where the plan position is `x` (paths of the test run along x).

@@ -6,7 +6,7 @@
 use super::chain::{Span, chains};
 use super::emit::{Emitter, feed_seconds, lift_seconds};
 use super::fit::fit;
-use super::rows::{Row, rows};
+use super::rows::{Row, rows, slanted_rim};
 use super::trace::{Sample, Tracer};
 use super::{Site, ToolpathError};
 use crate::cutter::Profile;
@@ -59,10 +59,11 @@ pub(super) fn raster(
     let tracer = Tracer::new(|p: DVec2| dropper.drop(p), profile, pitch, fit_mm);
     site.refuse_endless(angle_rad, stepover_mm, tracer.spacing_mm())?;
 
-    let spans: Vec<Vec<Span>> = rows(&site.job.stock.bounds(), angle_rad, stepover_mm)
-        .into_par_iter()
-        .map(|row| spans(site, &row, tracer.trace(row.from, row.to)))
-        .collect();
+    let bounds = site.job.stock.bounds();
+    let mut rows = rows(&bounds, angle_rad, stepover_mm);
+    rows.extend(slanted_rim(&bounds, angle_rad));
+    let spans: Vec<Vec<Span>> =
+        rows.into_par_iter().map(|row| spans(site, &row, tracer.trace(row.from, row.to))).collect();
     let link = |a: DVec3, b: DVec3| {
         let lift = lift_seconds(site.job, site.operation, a, b);
         if feed_seconds(site.operation, &[a, b]) > lift {

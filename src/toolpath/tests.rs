@@ -238,8 +238,8 @@ fn height_on(path: &[Sample], s: f64) -> f64 {
     a.z + (b.z - a.z) * ((s - a.s) / (b.s - a.s))
 }
 
-/// After every rapid down, the way into the wood is no steeper than the ramp until the tip has been at its lowest
-/// for the first time; only the piece down through the air above the wood is straight.
+/// Rapids down and straight plunges end above the wood; the first sloping piece after them is no steeper than
+/// the ramp. (The whole descent is tested where it is made.)
 fn assert_entries_are_ramped(path: &Toolpath, job: &Job, wood: &mut Heightfield) {
     let slope = libm::tan(job.ramp_rad);
     let profile = Profile::of(&path.cutter);
@@ -278,4 +278,172 @@ fn lower(wood: &mut Heightfield, profile: &Profile, m: &Move) {
             }
         }
     }
+}
+
+#[test]
+fn a_raster_leaves_no_more_than_the_scallop() {
+    for angle in [0.0, 30.0, 90.0] {
+        let op = raster(cutter(CutterShape::Ball, 2.0), Stepover::Scallop(0.05), angle);
+        let job = job(20.0, 14.0, 10.0, 0.2, vec![op]);
+        // One bump: a ball reaches all of it.
+        let bump = Bump { at: DVec2::new(6.0, 7.0), radius_mm: 4.0, height_mm: 1.5, wall: false };
+        let target = relief(&job, 2.0, 0.0, &[bump]);
+        let mut wood = Heightfield::flat(*target.grid(), 0.0);
+        let path = &plan_quietly(&job, &target)[0];
+        for m in &path.moves {
+            lower(&mut wood, &Profile::of(&path.cutter), m);
+        }
+        let most = wood.z().iter().zip(target.z()).map(|(w, t)| w - t).fold(f32::MIN, f32::max);
+        // Slopes reach 0.33 here: the cusp is up to 11 % higher there, and measured along z.
+        assert!(most < 0.05 * 1.17 + 0.008, "{most} left at {angle} degrees");
+        assert!(most > 0.03, "the passes lie closer than asked: {most}");
+    }
+}
+
+#[test]
+fn roughing_clears_a_level_ground_down_to_the_allowance() {
+    for shape in [CutterShape::Flat, CutterShape::Ball] {
+        let job = job(24.0, 15.0, 10.0, 0.25, vec![rough(cutter(shape, 6.0), 0.5, 1.5)]);
+        let target = relief(&job, 4.0, 0.0, &[]);
+        let path = &plan_quietly(&job, &target)[0];
+        let mut wood = Heightfield::flat(*target.grid(), 0.0);
+        for m in &path.moves {
+            lower(&mut wood, &Profile::of(&path.cutter), m);
+        }
+        let (low, high) = wood.range().unwrap();
+        let cusp = if shape == CutterShape::Ball { 0.26 } else { 0.0 };
+        assert!((low + 3.5).abs() < 0.0011, "{shape:?}: {low}");
+        assert!(f64::from(high) < -3.5 + cusp + 0.0011, "{shape:?}: {high}");
+        // Three levels of 1.17 mm, each one chain.
+        assert_eq!(
+            path.moves.windows(2).filter(|w| w[0].is_rapid() && !w[1].is_rapid()).count(),
+            3
+        );
+    }
+}
+
+#[test]
+fn the_same_bytes_with_one_and_two_threads() {
+    let job = job(
+        30.0,
+        20.0,
+        10.0,
+        0.25,
+        vec![
+            rough(cutter(CutterShape::Flat, 3.0), 0.4, 1.5),
+            raster(cutter(CutterShape::Ball, 2.0), Stepover::Scallop(0.02), 30.0),
+        ],
+    );
+    let wall = Bump { at: DVec2::new(9.0, 9.0), radius_mm: 4.0, height_mm: 2.5, wall: true };
+    let target = relief(&job, 4.0, 1.0, &[wall]);
+    let run = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| plan(&job, &target, &mut |_| ()).unwrap())
+    };
+    assert_eq!(run(1), run(2));
+}
+
+#[test]
+fn operations_with_one_cutter_share_a_program() {
+    let ball = cutter(CutterShape::Ball, 3.0);
+    let ops = vec![rough(ball.clone(), 0.3, 1.0), raster(ball, Stepover::Plan(0.8), 0.0)];
+    let job = job(12.0, 9.0, 10.0, 0.25, ops);
+    let target = relief(&job, 2.0, 0.0, &[]);
+    let paths = plan_quietly(&job, &target);
+    assert_eq!(paths.len(), 1);
+    assert_eq!(paths[0].name, "rough-finish-ball-3");
+    assert_eq!(paths[0].check(&job), Ok(()));
+}
+
+fn fails(job: &Job, target: &Heightfield) -> ToolpathError {
+    plan(job, target, &mut |_| ()).unwrap_err()
+}
+
+#[test]
+fn what_cannot_be_planned_is_refused() {
+    let ball = || cutter(CutterShape::Ball, 3.0);
+    let small = |op| job(12.0, 9.0, 10.0, 0.25, vec![op]);
+    let plain = small(raster(ball(), Stepover::Plan(0.8), 0.0));
+    let ground = relief(&plain, 2.0, 0.0, &[]);
+
+    let flat = small(raster(cutter(CutterShape::Flat, 3.0), Stepover::Scallop(0.01), 0.0));
+    assert!(matches!(
+        fails(&flat, &ground),
+        ToolpathError::ScallopWithoutBall { operation: 1, .. }
+    ));
+    let fine = small(raster(ball(), Stepover::Plan(1e-7), 0.0));
+    assert!(matches!(fails(&fine, &ground), ToolpathError::TooFine { .. }));
+    assert_eq!(fails(&plain, &relief(&plain, 0.0, 0.0, &[])), ToolpathError::NothingToCut);
+    let wide = job(13.0, 9.0, 10.0, 0.25, plain.operations.clone());
+    assert!(matches!(fails(&wide, &ground), ToolpathError::TargetTooSmall { .. }));
+    let deep = relief(&plain, 10.5, 0.0, &[]);
+    assert!(matches!(fails(&plain, &deep), ToolpathError::TargetOutsideStock { .. }));
+    let mut holes = ground.clone();
+    holes.z_mut()[7] = f32::NAN;
+    assert!(matches!(fails(&plain, &holes), ToolpathError::TargetOutsideStock { .. }));
+    let mut tiny = plain.clone();
+    tiny.machine.travel_mm.x = 8.0;
+    assert!(matches!(
+        fails(&tiny, &ground),
+        ToolpathError::Fault(PathFault::Travel { axis: 'X', .. })
+    ));
+}
+
+#[test]
+fn a_cutter_that_fits_nowhere_is_told() {
+    let ops = vec![
+        rough(cutter(CutterShape::Flat, 12.0), 0.5, 1.5),
+        raster(cutter(CutterShape::Ball, 1.0), Stepover::Plan(0.3), 0.0),
+    ];
+    let job = job(12.0, 9.0, 10.0, 0.25, ops);
+    // A pocket 6 x 3 mm: the roughing cutter is wider.
+    let target = relief(&job, 2.0, 3.0, &[]);
+    let mut notes = Vec::new();
+    let paths = plan(&job, &target, &mut |e| {
+        if let PlanEvent::Note(n) = e {
+            notes.push(n);
+        }
+    });
+    assert_eq!(paths.unwrap().len(), 1);
+    assert!(
+        notes.iter().any(|n| n.contains("rough, flat-12") && n.contains("fits nowhere")),
+        "{notes:?}"
+    );
+}
+
+#[test]
+fn broken_paths_are_found_out() {
+    let job = job(
+        12.0,
+        9.0,
+        10.0,
+        0.25,
+        vec![raster(cutter(CutterShape::Ball, 3.0), Stepover::Plan(0.8), 0.0)],
+    );
+    let good = plan_quietly(&job, &relief(&job, 2.0, 0.0, &[])).remove(0);
+    let broken = |change: &dyn Fn(&mut Vec<Move>)| {
+        let mut path = good.clone();
+        change(&mut path.moves);
+        path.check(&job).unwrap_err()
+    };
+    let feed = |speed| crate::geom::MoveKind::Feed { feed_mm_per_min: speed };
+    let down = good.moves.iter().position(|m| !m.is_rapid() && m.to.z < m.from.z).unwrap();
+    let across = good.moves.iter().position(|m| !m.is_rapid() && m.to.x != m.from.x).unwrap();
+    assert!(matches!(broken(&Vec::clear), PathFault::Empty { .. }));
+    assert!(matches!(broken(&|m| _ = m.remove(3)), PathFault::Gap { index: 3, .. }));
+    assert!(matches!(broken(&|m| _ = m.pop()), PathFault::EndsLow { .. }));
+    assert!(matches!(broken(&|m| m[down].kind = feed(5000.0)), PathFault::Plunge { .. }));
+    assert!(matches!(broken(&|m| m[down].kind = feed(0.0)), PathFault::BadFeed { .. }));
+    assert!(matches!(
+        broken(&|m| m[across].kind = crate::geom::MoveKind::Rapid),
+        PathFault::LowRapid { .. }
+    ));
+    assert!(matches!(broken(&|m| m[across].to.y = f64::NAN), PathFault::NotFinite { .. }));
+    assert!(matches!(
+        broken(&|m| {
+            m[across].to.x = 99.0;
+            m[across + 1].from.x = 99.0;
+        }),
+        PathFault::OutsideStock { .. }
+    ));
 }
