@@ -145,9 +145,9 @@ impl Canvas {
     pub(super) fn text(&mut self, text: &str, (x, y): (f32, f32), how: Lettering) {
         let width = font::width_px(text, how.capital_px);
         let left = match how.align {
-            Align::Left => x,
+            Align::Left => x + 0.5 * how.capital_px * how.weight,
             Align::Middle => x - 0.5 * width,
-            Align::Right => x - width,
+            Align::Right => x - width - 0.5 * how.capital_px * how.weight,
         };
         let Some(path) = font::path(text, left, y, how.capital_px) else { return };
         let stroke = Stroke {

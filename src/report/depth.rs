@@ -37,9 +37,10 @@ pub fn depth_png(field: &Heightfield) -> Result<Vec<u8>, ReportError> {
     let too_big = ReportError::TooBig { what: "a depth map", width: grid.nx, height: grid.ny };
     let side = |n: usize| u32::try_from(n).ok().filter(|n| *n <= 0x7fff_ffff);
     let (w, h) = side(grid.nx).zip(side(grid.ny)).ok_or(too_big)?;
+    // Written as f64: the shortest decimals of an f32 are another number when read as an f64.
     let notes = [
-        ("z_black_mm", low.to_string()),
-        ("z_white_mm", high.to_string()),
+        ("z_black_mm", f64::from(low).to_string()),
+        ("z_white_mm", f64::from(high).to_string()),
         ("pitch_mm", grid.pitch_mm.to_string()),
         ("origin_x_mm", grid.origin.x.to_string()),
         ("origin_y_mm", grid.origin.y.to_string()),

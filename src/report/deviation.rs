@@ -111,7 +111,8 @@ pub fn deviation_png(
         canvas.circle((x, y), px(26.0), Some(px(9.0)), [255, 255, 255]);
         canvas.circle((x, y), px(26.0), Some(px(4.0)), GOUGE[4].1);
     }
-    legend(&mut canvas, [margin, bottom + px(104.0), room], unit, &scale, limits);
+    let hatched = figures.known < grid.len();
+    legend(&mut canvas, [margin, bottom + px(104.0), room], unit, &scale, limits, hatched);
     canvas.into_png(None)
 }
 
@@ -235,6 +236,7 @@ fn legend(
     unit: f32,
     scale: &SoftScale,
     limits: DeviationScale,
+    hatched: bool,
 ) {
     let px = |n: f32| (n * unit).round();
     let height = px(34.0);
@@ -261,7 +263,12 @@ fn legend(
     let low = top + height + px(84.0);
     canvas.text("too deep", (left, low), small.colored(GOUGE[3].1));
     let center = left + 0.5 * width;
-    canvas.text("mm, normal to the target", (center, low), small.aligned(Align::Middle));
+    let what = if hatched {
+        "mm, normal to the target; hatched: not measured"
+    } else {
+        "mm, normal to the target"
+    };
+    canvas.text(what, (center, low), small.aligned(Align::Middle));
     canvas.text(
         "left over",
         (left + width, low),

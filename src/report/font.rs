@@ -6,7 +6,7 @@ use tiny_skia::{Path, PathBuilder};
 /// Height of a capital in the units of the strokes.
 const CAPITAL: f32 = 14.0;
 /// Space between two letters, units.
-const GAP: f32 = 3.3;
+const GAP: f32 = 3.7;
 /// Handle length of a cubic that stands for a quarter of an ellipse.
 const QUARTER: f32 = 0.552_285;
 /// Drawn for a character that the face does not have: an empty box.

@@ -46,12 +46,13 @@ impl Grain {
         let t = ring - ring.floor();
         let late = if t < 0.88 { t * t * t } else { 0.68 * (1.0 - t) / 0.12 };
         // Fibres and pores: fine streaks along the grain, no finer than the pixels.
+        let along = along + 4.0 * wobble;
         let streak = noise(along / 9.0, across / self.finest.max(0.32), z / 0.5, 3);
         let fine = noise(along / 3.0, across / self.finest.max(0.2), z / 0.3, 4);
         // Ray flecks: short dark dashes.
-        let fleck = noise(along / 1.5, across / self.finest.max(0.34), z / 0.6, 5);
-        let fleck = ((fleck - 0.74) * 6.0).clamp(0.0, 1.0);
-        (0.36 * late + 0.22 * streak + 0.14 * fine + 0.34 * fleck).min(1.0)
+        let fleck = noise(along / 1.3, across / self.finest.max(0.26), z / 0.6, 5);
+        let fleck = ((fleck - 0.79) * 7.0).clamp(0.0, 1.0);
+        (0.34 * late + 0.20 * streak + 0.14 * fine + 0.24 * fleck).min(1.0)
     }
 }
 
@@ -60,10 +61,12 @@ fn noise(x: f32, y: f32, z: f32, seed: u32) -> f32 {
     let (i, u) = split(x);
     let (j, v) = split(y);
     let (k, w) = split(z);
+    let (above, behind) = (j.wrapping_add(1), k.wrapping_add(1));
     let mix = |a: f32, b: f32, t: f32| a + (b - a) * t;
-    let edge = |j: i32, k: i32| mix(lattice(i, j, k, seed), lattice(i + 1, j, k, seed), u);
-    let near = mix(edge(j, k), edge(j + 1, k), v);
-    let far = mix(edge(j, k + 1), edge(j + 1, k + 1), v);
+    let edge =
+        |j: i32, k: i32| mix(lattice(i, j, k, seed), lattice(i.wrapping_add(1), j, k, seed), u);
+    let near = mix(edge(j, k), edge(above, k), v);
+    let far = mix(edge(j, behind), edge(above, behind), v);
     mix(near, far, w)
 }
 
@@ -71,7 +74,7 @@ fn noise(x: f32, y: f32, z: f32, seed: u32) -> f32 {
 fn split(x: f32) -> (i32, f32) {
     let floor = x.floor();
     let t = x - floor;
-    (floor as i32 & 0x00ff_ffff, t * t * (3.0 - 2.0 * t))
+    (floor as i32, t * t * (3.0 - 2.0 * t))
 }
 
 /// A value between 0 and 1 that looks random.

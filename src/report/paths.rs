@@ -38,6 +38,9 @@ struct Segment {
     pen: f32,
     opacity: f32,
     rapid: bool,
+    /// Whether its start and its end are round. Where the next line goes on smoothly, the end is cut
+    /// square, so that no pixel is painted twice and long curves stay even.
+    round: [bool; 2],
 }
 
 /// What the legend under a panel says.
@@ -219,21 +222,32 @@ impl Layout {
         let plan = |m: &Move| (m.to.truncate() - m.from.truncate()).length();
         let length_px: f64 = feed().map(plan).sum::<f64>() * self.px_per_mm;
         let size = stock.bounds().size() * self.px_per_mm;
-        // So wide that the passes cover about half of the board, were they spread evenly over it.
-        let pen = 0.5 * size.x * size.y / length_px.max(1.0);
+        // So wide that the passes cover about six tenths of the board, were they spread evenly over it.
+        let pen = 0.62 * size.x * size.y / length_px.max(1.0);
         let opacity = (pen / 0.8).clamp(0.3, 1.0) as f32;
         let pen = pen.clamp(0.8, 2.4) as f32;
         let shade = |z: f64| if deepest < 0.0 { (z / deepest).clamp(0.0, 1.0) as f32 } else { 0.0 };
-        let mut out: Vec<Segment> = feed()
-            .map(|m| Segment {
+        let goes_on = |a: Option<&Move>, b: Option<&Move>| {
+            let (Some(a), Some(b)) = (a, b) else { return false };
+            let (u, v) = ((a.to - a.from).truncate(), (b.to - b.from).truncate());
+            // Smoothly: by less than 30 degrees.
+            let smooth = u.dot(v) > 0.866 * u.length() * v.length();
+            !a.is_rapid() && !b.is_rapid() && a.to == b.from && smooth
+        };
+        let mut out = Vec::with_capacity(moves.len());
+        for (k, m) in moves.iter().enumerate().filter(|(_, m)| !m.is_rapid()) {
+            let before = k.checked_sub(1).map(|k| &moves[k]);
+            let round = [!goes_on(before, Some(m)), !goes_on(Some(m), moves.get(k + 1))];
+            out.push(Segment {
                 a: self.to_px(m.from.truncate()),
                 b: self.to_px(m.to.truncate()),
                 shade: [shade(m.from.z), shade(m.to.z)],
                 pen,
                 opacity,
                 rapid: false,
-            })
-            .collect();
+                round,
+            });
+        }
         for m in moves.iter().filter(|m| m.is_rapid() && plan(m) > 0.0) {
             self.dashes(m, &mut out);
         }
@@ -256,6 +270,7 @@ impl Layout {
                 pen: 1.1,
                 opacity: 0.6,
                 rapid: true,
+                round: [true; 2],
             });
         }
     }
@@ -343,7 +358,11 @@ fn paint_row(row: &mut [Rgb], y: f32, s: &Segment, colors: &[Rgb]) {
     let inverse = if length2 > 0.0 { 1.0 / length2 } else { 0.0 };
     for (x, pixel) in row.iter_mut().enumerate().take(last).skip(first) {
         let (px, py) = (x as f32 + 0.5 - s.a[0], y - s.a[1]);
-        let t = ((px * dx + py * dy) * inverse).clamp(0.0, 1.0);
+        let t = (px * dx + py * dy) * inverse;
+        if (t < 0.0 && !s.round[0]) || (t >= 1.0 && !s.round[1]) {
+            continue;
+        }
+        let t = t.clamp(0.0, 1.0);
         let (ex, ey) = (px - t * dx, py - t * dy);
         let cover = (reach - (ex * ex + ey * ey).sqrt()).clamp(0.0, 1.0).min(s.pen) * s.opacity;
         if cover > 0.0 {
@@ -391,7 +410,7 @@ fn legend(canvas: &mut Canvas, [left, top, room]: [f32; 3], unit: f32, deepest: 
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::geom::{DVec3, MoveKind};
 
@@ -414,7 +433,7 @@ mod tests {
     }
 
     fn segment(a: [f32; 2], b: [f32; 2]) -> Segment {
-        Segment { a, b, shade: [1.0; 2], pen: 1.0, opacity: 1.0, rapid: false }
+        Segment { a, b, shade: [1.0; 2], pen: 1.0, opacity: 1.0, rapid: false, round: [true; 2] }
     }
 
     fn ink(image: &Image) -> f64 {

@@ -46,10 +46,10 @@ impl Look {
 
 /// A relief this shallow, as a fraction of its longer side, is lit as if it were this deep, so that
 /// its form can still be read; by a factor of 3 at most.
-const LEAST_DEPTH: f64 = 0.035;
+const LEAST_DEPTH: f64 = 0.06;
 
 /// The hill-shaded relief as an RGB PNG: one soft sun from the upper left, a sky that leaves hollows
-/// and the foot of walls dark, and soft cast shadows (horizon sweeps over 41 lights, in the manner of
+/// and the foot of walls dark, and soft cast shadows (horizon sweeps over 45 lights, in the manner of
 /// Kennelly and Stewart, 2006).
 ///
 /// One pixel a node where the longer side has 900 to 2000 of them; bigger fields are averaged down,
@@ -87,7 +87,7 @@ pub fn shaded_png(
         "{} × {} mm, {} mm deep",
         short((grid.x * 10.0).round() * 0.1),
         short((grid.y * 10.0).round() * 0.1),
-        short(f64::from(high - low)),
+        short((f64::from(high - low) * 100.0).round() * 0.01),
     );
     let text_left = left.min(margin);
     let base = margin + h + px(96.0);
@@ -144,12 +144,16 @@ struct Material {
     albedo: [f32; 3],
     /// Colour of the darkest grain.
     dark: [f32; 3],
+    /// Strength of the sun's reflection.
+    sheen: f32,
     grain: Option<Grain>,
 }
 
 /// Warm light of the sun and cool light of the sky; together a level surface gets about 1.
 const SUN: [f32; 3] = [0.70, 0.665, 0.60];
 const SKY: [f32; 3] = [0.29, 0.31, 0.345];
+/// The sun's reflection on level ground.
+const LEVEL_SHEEN: f32 = 0.2;
 
 fn colored(plane: &Plane, light: &Lighting, look: Look) -> Image {
     let material = Material::of(look, plane);
@@ -165,10 +169,13 @@ fn colored(plane: &Plane, light: &Lighting, look: Look) -> Image {
             let x = (column as f32 - middle_x) * mm;
             let dark = material.grain.map_or(0.0, |grain| grain.at(x, y, plane.v[k]));
             // The sky's light, squared a little, so that hollows stay readable on paper.
-            let sky = light.sky[k] * (0.45 + 0.55 * light.sky[k]);
+            let sky = light.sky[k] * light.sky[k];
+            // Level ground keeps its own colour: only what turns towards the sun gleams.
+            let sheen = material.sheen * (light.sheen[k] - LEVEL_SHEEN).max(0.0);
             for c in 0..3 {
                 let albedo = material.albedo[c] + (material.dark[c] - material.albedo[c]) * dark;
-                pixel[c] = to_srgb.of(albedo * (SUN[c] * light.sun[k] + SKY[c] * sky));
+                let diffuse = albedo * (SUN[c] * light.sun[k] + SKY[c] * sky);
+                pixel[c] = to_srgb.of(diffuse + SUN[c] * sheen);
             }
         }
     });
@@ -178,7 +185,9 @@ fn colored(plane: &Plane, light: &Lighting, look: Look) -> Image {
 impl Material {
     fn of(look: Look, plane: &Plane) -> Self {
         match look {
-            Look::Plaster => Self { albedo: [0.74, 0.715, 0.675], dark: [0.0; 3], grain: None },
+            Look::Plaster => {
+                Self { albedo: [0.74, 0.715, 0.675], dark: [0.0; 3], sheen: 0.0, grain: None }
+            }
             Look::Wood { tone, grain_rad } => {
                 let linear = [tone.0, tone.1, tone.2].map(|c| from_srgb(f64::from(c) / 255.0));
                 let shift =
@@ -187,6 +196,7 @@ impl Material {
                 Self {
                     albedo: shift([1.24, 1.27, 1.32]),
                     dark: shift([0.50, 0.42, 0.34]),
+                    sheen: 0.16,
                     grain: Some(Grain::new(grain_rad, span, plane.mm_per_px)),
                 }
             }
@@ -220,5 +230,131 @@ impl SrgbTable {
     fn of(&self, linear: f32) -> u8 {
         let k = (linear.max(0.0) * Self::STEPS as f32 + 0.5) as usize;
         self.0[k.min(self.0.len() - 1)]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geom::{DVec2, Grid};
+    use crate::report::{DeviationScale, depth_png, deviation_png, paths_png};
+    use std::io::Cursor;
+
+    fn dome(nx: usize, ny: usize) -> Heightfield {
+        let grid = Grid { nx, ny, pitch_mm: 0.2, origin: DVec2::ZERO };
+        let middle = grid.bounds().center();
+        Heightfield::from_fn(grid, |p| (-0.05 * (p - middle).length_squared()).max(-4.0))
+    }
+
+    fn pixels(bytes: &[u8]) -> (usize, usize, Vec<u8>) {
+        let mut reader = png::Decoder::new(Cursor::new(bytes)).read_info().unwrap();
+        let mut data = vec![0; reader.output_buffer_size().unwrap()];
+        let frame = reader.next_frame(&mut data).unwrap();
+        assert_eq!(
+            (frame.color_type, frame.bit_depth),
+            (png::ColorType::Rgb, png::BitDepth::Eight)
+        );
+        (frame.width as usize, frame.height as usize, data)
+    }
+
+    #[test]
+    fn a_dome_is_bright_towards_the_upper_left_and_dark_opposite() {
+        for look in [Look::Plaster, Look::of_wood("beech", 0.3), Look::of_wood("walnut", 0.0)] {
+            let (w, h, rgb) = pixels(&shaded_png(&dome(120, 120), look, None).unwrap());
+            assert_eq!((w, h), (960, 960));
+            let mean = |cx: usize, cy: usize| -> f64 {
+                let block =
+                    (cy - 20..cy + 20).flat_map(|y| (cx - 20..cx + 20).map(move |x| (x, y)));
+                block.map(|(x, y)| f64::from(rgb[3 * (y * w + x) + 1])).sum::<f64>() / 1600.0
+            };
+            let (lit, shaded) = (mean(360, 360), mean(600, 600));
+            assert!(lit > 1.15 * shaded, "{look:?}: {lit} {shaded}");
+        }
+    }
+
+    #[test]
+    fn the_page_has_room_for_its_caption_and_prints_at_true_size() {
+        let bytes = shaded_png(&dome(1000, 500), Look::Plaster, Some("Dome")).unwrap();
+        let (w, h, _) = pixels(&bytes);
+        assert!(w > 1000 && h > 560, "{w} {h}");
+        let reader = png::Decoder::new(Cursor::new(&bytes)).read_info().unwrap();
+        // 0.2 mm a pixel.
+        assert_eq!(reader.info().pixel_dims.unwrap().xppu, 5000);
+    }
+
+    #[test]
+    fn big_fields_are_brought_down_and_slim_ones_survive() {
+        let (w, h, _) = pixels(&shaded_png(&dome(2500, 40), Look::Plaster, None).unwrap());
+        assert_eq!((w, h), (2000, 32));
+        for (nx, ny) in [(2, 2), (2, 3000), (3000, 2)] {
+            for title in [None, Some("slim")] {
+                assert!(shaded_png(&dome(nx, ny), Look::of_wood("oak", 1.0), title).is_ok());
+            }
+        }
+    }
+
+    #[test]
+    fn heights_that_are_not_numbers_are_refused() {
+        for bad in [f32::NAN, f32::INFINITY] {
+            let mut field = dome(20, 20);
+            field.z_mut()[77] = bad;
+            let got = shaded_png(&field, Look::Plaster, None);
+            assert!(matches!(got, Err(ReportError::NotFinite { .. })));
+        }
+    }
+
+    #[test]
+    fn every_picture_is_the_same_with_one_thread_and_with_many() {
+        use crate::geom::{DVec3, Move, MoveKind};
+        let field = dome(150, 130);
+        let deviation: Vec<f32> =
+            (0..field.z().len()).map(|k| (k % 97) as f32 * 1e-3 - 0.02).collect();
+        let at =
+            |k: usize| DVec3::new((k * 7 % 90) as f64, (k * 13 % 50) as f64, -((k % 9) as f64));
+        let moves: Vec<Move> = (0..500)
+            .map(|k| {
+                let kind = match k % 5 {
+                    0 => MoveKind::Rapid,
+                    _ => MoveKind::Feed { feed_mm_per_min: 900.0 },
+                };
+                Move { from: at(k), to: at(k + 1), kind, line: 0 }
+            })
+            .collect();
+        let all = |threads: usize| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| {
+                let limits = DeviationScale { gouge_mm: 0.01, scallop_mm: 0.01 };
+                let stock = crate::report::paths::tests::stock();
+                [
+                    shaded_png(&field, Look::of_wood("beech", 0.2), Some("Dome")).unwrap(),
+                    depth_png(&field).unwrap(),
+                    deviation_png(&deviation, &field, limits, "Deviation").unwrap(),
+                    paths_png(&[("a", &moves), ("b", &moves[..99])], &stock, "Paths").unwrap(),
+                    crate::report::stl(&field, -9.0, 1).unwrap(),
+                ]
+            })
+        };
+        let one = all(1);
+        assert!(all(2) == one);
+    }
+
+    #[test]
+    fn scale_bars_are_round_and_fit() {
+        for (width, want) in
+            [(160.0, 20.0), (170.0, 50.0), (40.0, 10.0), (9.0, 2.0), (1000.0, 200.0)]
+        {
+            assert_eq!(scale_bar_mm(width), want, "{width}");
+        }
+    }
+
+    #[test]
+    fn the_tone_table_meets_the_srgb_curve() {
+        let table = SrgbTable::new();
+        // Middle grey of 21.4 % linear light is 127.5 in sRGB.
+        assert!((127..=128).contains(&table.of(0.214)));
+        assert_eq!(table.of(0.0), 0);
+        assert_eq!(table.of(-1.0), 0);
+        assert!(table.of(1.0) > 225 && table.of(9.0) >= table.of(1.0));
+        assert!((from_srgb(0.5) - 0.214).abs() < 1e-3);
     }
 }

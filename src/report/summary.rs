@@ -78,8 +78,8 @@ mod tests {
 job       Lotus (lotus.svg) on Shapeoko 3
 stock     160 x 160 x 20 mm beech, zero: lower-left corner, top of the stock
 relief    9 mm deep, 2 layers, nodes every 0.1 mm
-programs  1-rough-flat-6.nc       18.4 m  12 min 30 s
-          2-finish-ball-3.nc      61.3 m  1 h 05 min
+programs  1-rough-flat-6.nc      18.4 m   12 min 30 s
+          2-finish-ball-3.nc     61.3 m    1 h 05 min
 time      1 h 18 min
 leftover  0.002 / 0.006 / 0.011 / 0.412 mm (p50 / p90 / p99 / max) everywhere
 note      artwork in pixels: its longer side became 150 mm
