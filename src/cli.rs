@@ -84,7 +84,10 @@ pub fn main() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(Stop::Refused(e)) if is_broken_pipe(&e) => ExitCode::SUCCESS,
         Err(Stop::Refused(e)) => {
-            observe::complain(&format!("error: {e:#}"));
+            let text = format!("{e:#}");
+            // The pictures of job faults bring their own heading.
+            let heading = if text.starts_with("error") { "" } else { "error: " };
+            observe::complain(&format!("{heading}{text}"));
             ExitCode::from(BAD_INPUT)
         }
         Err(Stop::CheckFailed(text)) => {

@@ -253,8 +253,7 @@ impl Walker<'_> {
         let name = self.name(element);
         if is_open(curve) {
             let curve = scope.at * curve.clone();
-            let shape =
-                self.shape(Part::Open, &curve, FillRule::NonZero, Rgb(0, 0, 0), element);
+            let shape = self.shape(Part::Open, &curve, FillRule::NonZero, Rgb(0, 0, 0), element);
             self.shapes.push(shape);
             self.odds.add(Odd::OpenPath, name);
         } else {

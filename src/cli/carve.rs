@@ -1,14 +1,16 @@
 //! `relievo carve`: the whole job, from artwork to proved programs and pictures.
 
-use super::files::Outputs;
+use super::files::{self, Outputs};
 use super::observe::{self, Stages};
 use super::{Stop, inputs, outcome};
 use crate::carve;
 use std::path::{Path, PathBuf};
 
 #[derive(Debug, clap::Args)]
-#[command(after_help = "Examples:\n  relievo carve rose.svg                 good defaults, outputs in rose-carving/\n  \
-                        relievo carve rose.toml --timings      a job file, and how long each stage took")]
+#[command(
+    after_help = "Examples:\n  relievo carve rose.svg                 good defaults, outputs in rose-carving/\n  \
+                        relievo carve rose.toml --timings      a job file, and how long each stage took"
+)]
 pub(super) struct Args {
     /// A job file (.toml) or artwork (.svg, .svgz)
     pub(super) input: PathBuf,
@@ -42,7 +44,8 @@ pub(super) fn run(args: &Args) -> Result<(), Stop> {
         return Err(Stop::CheckFailed(outcome::failure(&carving)));
     }
     stages.enter("pictures");
-    let (data, made) = outcome::outputs(&carving)?;
+    let again = files::name_from(&folder, &input.artwork_file)?;
+    let (data, made) = outcome::outputs(&carving, &again)?;
     stages.enter("write");
     for (name, bytes) in &made {
         outputs.add(name, bytes)?;

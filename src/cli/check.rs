@@ -36,7 +36,12 @@ pub(super) fn run(args: &Args) -> Result<(), Stop> {
         job.stock.thickness_mm
     );
     for (layer, outlines) in job.layers.iter().zip(&design.outlines.layers) {
-        let area: f64 = outlines.figures.iter().flat_map(|f| &f.regions).map(crate::outline::Region::area).sum();
+        let area: f64 = outlines
+            .figures
+            .iter()
+            .flat_map(|f| &f.regions)
+            .map(crate::outline::Region::area)
+            .sum();
         text += &format!(
             "  layer {:<20} {:>4} figures {:>10.1} mm^2  {}\n",
             layer.name,

@@ -11,14 +11,17 @@ const LARGEST_INPUT: u64 = 512 << 20;
 
 /// Reads a whole input file.
 pub(super) fn read(path: &Path) -> Result<Vec<u8>> {
-    let meta = fs::metadata(path)
-        .with_context(|| format!("cannot read {}", path.display()))?;
+    let meta = fs::metadata(path).with_context(|| format!("cannot read {}", path.display()))?;
     if meta.is_dir() {
         bail!("{} is a folder; give a file", path.display());
     }
     if meta.len() > LARGEST_INPUT {
-        bail!("{} has {} MiB, more than the {} MiB that are read; simplify it", path.display(),
-            meta.len() >> 20, LARGEST_INPUT >> 20);
+        bail!(
+            "{} has {} MiB, more than the {} MiB that are read; simplify it",
+            path.display(),
+            meta.len() >> 20,
+            LARGEST_INPUT >> 20
+        );
     }
     fs::read(path).with_context(|| format!("cannot read {}", path.display()))
 }
@@ -34,6 +37,21 @@ pub(super) fn read_text(path: &Path) -> Result<String> {
             bail!("{}:{line}: not UTF-8 text; save the file as UTF-8", path.display())
         }
     }
+}
+
+/// How a job file in `folder` names `file`: by a relative path where there is one, with `/` between.
+pub(super) fn name_from(folder: &Path, file: &Path) -> Result<String> {
+    let full = |p: &Path| {
+        fs::canonicalize(p).with_context(|| format!("cannot find {} again", p.display()))
+    };
+    let (folder, file) = (full(folder)?, full(file)?);
+    let common = folder.components().zip(file.components()).take_while(|(a, b)| a == b).count();
+    if common == 0 {
+        return Ok(file.display().to_string()); // another drive
+    }
+    let up = folder.components().skip(common).map(|_| "..".to_string());
+    let down = file.components().skip(common).map(|c| c.as_os_str().to_string_lossy().into_owned());
+    Ok(up.chain(down).collect::<Vec<_>>().join("/"))
 }
 
 /// The files of one run, gathered in a folder inside their destination and moved in at the end.

@@ -34,7 +34,9 @@ pub(super) fn load(path: &Path) -> Result<Input> {
             let name = path.file_name().unwrap_or_default().to_string_lossy();
             (Draft::for_artwork(&name, &library), path.to_path_buf())
         }
-        "" => bail!("{} has no extension; give a job file (.toml) or artwork (.svg)", path.display()),
+        "" => {
+            bail!("{} has no extension; give a job file (.toml) or artwork (.svg)", path.display())
+        }
         other => bail!(
             "{}: '.{other}' files are not read; give a job file (.toml) or artwork (.svg, .svgz)",
             path.display()

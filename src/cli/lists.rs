@@ -20,7 +20,10 @@ pub(super) fn machines(args: &Args) -> Result<(), Stop> {
     if args.json {
         return json(&library.machines().collect::<Vec<_>>());
     }
-    let mut text = format!("{:<14}{:<34}{:>18}{:>14}{:>16}\n", "name", "machine", "travel mm", "rate mm/min", "spindle rpm");
+    let mut text = format!(
+        "{:<14}{:<34}{:>18}{:>14}{:>16}\n",
+        "name", "machine", "travel mm", "rate mm/min", "spindle rpm"
+    );
     for m in library.machines() {
         let t = m.travel_mm;
         text += &format!(
@@ -40,10 +43,16 @@ pub(super) fn cutters(args: &Args) -> Result<(), Stop> {
     if args.json {
         return json(&library.cutters().collect::<Vec<_>>());
     }
-    let mut text = format!("{:<14}{:<8}{:>12}{:>9}{:>10}{:>10}\n", "name", "shape", "diameter mm", "flutes", "flute mm", "shank mm");
+    let mut text = format!(
+        "{:<14}{:<8}{:>12}{:>9}{:>10}{:>10}\n",
+        "name", "shape", "diameter mm", "flutes", "flute mm", "shank mm"
+    );
     for c in library.cutters() {
         let shape = format!("{:?}", c.shape).to_lowercase();
-        text += &format!("{:<14}{shape:<8}{:>12}{:>9}{:>10}{:>10}\n", c.name, c.diameter_mm, c.flutes, c.flute_mm, c.shank_mm);
+        text += &format!(
+            "{:<14}{shape:<8}{:>12}{:>9}{:>10}{:>10}\n",
+            c.name, c.diameter_mm, c.flutes, c.flute_mm, c.shank_mm
+        );
     }
     Ok(observe::say(&text)?)
 }

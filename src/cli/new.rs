@@ -22,7 +22,11 @@ pub(super) struct Args {
 
 pub(super) fn run(args: &Args) -> Result<(), Stop> {
     if args.artwork.extension().is_some_and(|e| e == "toml") {
-        return Err(anyhow!("{} is a job file already; give artwork (.svg)", args.artwork.display()).into());
+        return Err(anyhow!(
+            "{} is a job file already; give artwork (.svg)",
+            args.artwork.display()
+        )
+        .into());
     }
     let out = args.out.clone().unwrap_or_else(|| args.artwork.with_extension("toml"));
     let input = inputs::load(&args.artwork)?;
@@ -30,7 +34,11 @@ pub(super) fn run(args: &Args) -> Result<(), Stop> {
     let text = job::template(&name, &input.artwork.found(), &input.library)?;
     write_new(&out, &text)?;
     if !args.quiet {
-        observe::say(&format!("{} written; edit it, then: relievo carve {}", out.display(), out.display()))?;
+        observe::say(&format!(
+            "{} written; edit it, then: relievo carve {}",
+            out.display(),
+            out.display()
+        ))?;
     }
     Ok(())
 }
@@ -40,7 +48,10 @@ fn write_new(path: &std::path::Path, text: &str) -> anyhow::Result<()> {
     use std::io::Write;
     let mut file = match std::fs::File::create_new(path) {
         Err(e) if e.kind() == std::io::ErrorKind::AlreadyExists => {
-            return Err(anyhow!("{} is there already; choose another name with --out", path.display()));
+            return Err(anyhow!(
+                "{} is there already; choose another name with --out",
+                path.display()
+            ));
         }
         file => file.with_context(|| format!("cannot write {}", path.display()))?,
     };

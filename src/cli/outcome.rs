@@ -31,8 +31,11 @@ pub(super) fn failure(carving: &Carving) -> String {
     text
 }
 
-/// All files of the run, and the data of its report.
-pub(super) fn outputs(carving: &Carving) -> Result<(ReportData, Vec<Made>), ReportError> {
+/// All files of the run, and the data of its report. `artwork` is how a job file beside them names the artwork.
+pub(super) fn outputs(
+    carving: &Carving,
+    artwork: &str,
+) -> Result<(ReportData, Vec<Made>), ReportError> {
     let design = &carving.design;
     let (job, target) = (&design.job, &design.relief.target);
     let verdict = &carving.verdict;
@@ -43,10 +46,8 @@ pub(super) fn outputs(carving: &Carving) -> Result<(ReportData, Vec<Made>), Repo
         .zip(&carving.paths)
         .map(|(p, path)| (p.name.as_str(), path.moves.as_slice()))
         .collect();
-    let limits = DeviationScale {
-        gouge_mm: job.tolerance.gouge_mm,
-        scallop_mm: job.tolerance.scallop_mm,
-    };
+    let limits =
+        DeviationScale { gouge_mm: job.tolerance.gouge_mm, scallop_mm: job.tolerance.scallop_mm };
     let title = |what: &str| format!("{} - {what}", job.title);
     let jobs: [(&str, &(dyn Fn() -> Result<Vec<u8>, ReportError> + Sync)); 6] = [
         ("relief.png", &|| report::shaded_png(target, Look::Plaster, Some(&title("relief")))),
@@ -75,11 +76,17 @@ pub(super) fn outputs(carving: &Carving) -> Result<(ReportData, Vec<Made>), Repo
     data.pictures = vec![
         picture("carved.png", "As carved", "What the dry run of the programs leaves."),
         picture("relief.png", "Design", "The relief that the programs are held against."),
-        picture("deviation.png", "Deviation", "Blue: wood left above the design. Red: cut below it."),
+        picture(
+            "deviation.png",
+            "Deviation",
+            "Blue: wood left above the design. Red: cut below it.",
+        ),
         picture("paths.png", "Toolpaths", "Feed moves by depth; rapids light."),
     ];
     files.push(("report.html".into(), report::html(&data).into_bytes()));
-    files.push(("job.toml".into(), job.to_toml().into_bytes()));
+    let mut again = job.clone();
+    again.artwork.file = artwork.to_string();
+    files.push(("job.toml".into(), again.to_toml().into_bytes()));
     files.extend(carving.programs.iter().map(|p| (p.name.clone(), p.text.clone().into_bytes())));
     Ok((data, files))
 }
@@ -218,7 +225,11 @@ fn checks(carving: &Carving) -> Vec<Check> {
         ("second oracle agrees".into(), vec![K::Oracles], "agrees".into()),
     ];
     if job.strict {
-        rows.push((format!("no leftover above {limit} mm where cutters reach"), vec![K::Leftover], over));
+        rows.push((
+            format!("no leftover above {limit} mm where cutters reach"),
+            vec![K::Leftover],
+            over,
+        ));
     }
     rows.into_iter()
         .map(|(name, kinds, fine)| {

@@ -42,7 +42,11 @@ pub fn trace(
         out.notes.extend(notes);
     }
     debug_assert!(
-        out.layers.iter().flat_map(|l| &l.figures).flat_map(|f| &f.regions).all(|r| r.check().is_ok()),
+        out.layers
+            .iter()
+            .flat_map(|l| &l.figures)
+            .flat_map(|f| &f.regions)
+            .all(|r| r.check().is_ok()),
         "every region keeps its laws"
     );
     Ok(out)
@@ -65,11 +69,7 @@ struct Tracer<'a> {
 }
 
 impl<'a> Tracer<'a> {
-    fn new(
-        placed: &'a Placed,
-        layers: &[LayerSpec],
-        chord_mm: f64,
-    ) -> Result<Self, OutlineError> {
+    fn new(placed: &'a Placed, layers: &[LayerSpec], chord_mm: f64) -> Result<Self, OutlineError> {
         let grid = FixedGrid::covering(&placed.bounds);
         let mut needed = vec![layers.iter().any(|l| l.visible); placed.shapes.len()];
         for i in placed.layers.iter().flatten() {
@@ -123,11 +123,8 @@ impl<'a> Tracer<'a> {
         let notes = notes::of_layer(&layer.name, &changes, self.least_area);
         let figures: Vec<Figure> = figures.into_iter().filter(|f| !f.regions.is_empty()).collect();
         if figures.is_empty() {
-            let why = if notes.is_empty() {
-                "no shape is in it".to_owned()
-            } else {
-                notes.join("; ")
-            };
+            let why =
+                if notes.is_empty() { "no shape is in it".to_owned() } else { notes.join("; ") };
             return Err(OutlineError::EmptyLayer { layer: layer.name.clone(), why });
         }
         Ok((OutlineLayer { name: layer.name.clone(), figures }, notes))
@@ -150,8 +147,15 @@ impl<'a> Tracer<'a> {
             (true, false) => Some(Gone::TooSmall),
         };
         let regions_now = regions.len();
-        let change =
-            Change { shape: shape.clone(), rule, crossings, regions: regions_now, touching, slivers, gone };
+        let change = Change {
+            shape: shape.clone(),
+            rule,
+            crossings,
+            regions: regions_now,
+            touching,
+            slivers,
+            gone,
+        };
         Ok((Figure { source: shape, regions }, change))
     }
 
