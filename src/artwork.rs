@@ -238,7 +238,9 @@ pub enum ArtworkError {
         text: String,
     },
     /// A number or path data that cannot be understood or carved.
-    #[error("{element}: {attribute} is broken at \"{near}\": {reason}; repair or remove the element")]
+    #[error(
+        "{element}: {attribute} is broken at \"{near}\": {reason}; repair or remove the element"
+    )]
     Value {
         /// The element.
         element: String,
@@ -261,7 +263,9 @@ pub enum ArtworkError {
         href: String,
     },
     /// A reference to an element that is not there.
-    #[error("{element} refers to \"#{target}\", which is not in the file; add it or remove the reference")]
+    #[error(
+        "{element} refers to \"#{target}\", which is not in the file; add it or remove the reference"
+    )]
     Dangling {
         /// The element.
         element: String,
@@ -301,7 +305,7 @@ pub enum ArtworkError {
          (font_dirs in [artwork]) or convert the text to paths"
     )]
     Glyph {
-        /// The text elements of the file.
+        /// The text element.
         element: String,
         /// The characters.
         characters: String,
@@ -309,7 +313,9 @@ pub enum ArtworkError {
         plural: &'static str,
     },
     /// A stroke of more dashes than can be meant.
-    #[error("{element}: its stroke has about {count:.0} dashes, more than {limit}; use longer dashes or a plain stroke")]
+    #[error(
+        "{element}: its stroke has about {count:.0} dashes, more than {limit}; use longer dashes or a plain stroke"
+    )]
     Dashes {
         /// The element.
         element: String,
@@ -331,7 +337,9 @@ pub enum ArtworkError {
         notes: Vec<String>,
     },
     /// A selector that selects nothing.
-    #[error("layer '{layer}': select = \"{select}\" matches nothing in the artwork; there is {there_is}")]
+    #[error(
+        "layer '{layer}': select = \"{select}\" matches nothing in the artwork; there is {there_is}"
+    )]
     NoMatch {
         /// Name of the layer.
         layer: String,
@@ -341,7 +349,9 @@ pub enum ArtworkError {
         there_is: String,
     },
     /// A size that no artwork can have.
-    #[error("the artwork cannot be scaled to {unit_mm} mm a unit at {at}: give it a size between 0.1 mm and 10 m")]
+    #[error(
+        "the artwork cannot be scaled to {unit_mm} mm a unit at {at}: give it a size between 0.1 mm and 10 m"
+    )]
     Scale {
         /// Millimetres a unit.
         unit_mm: f64,

@@ -96,7 +96,9 @@ pub enum OutlineError {
         shape: String,
     },
     /// More vertices than a shape of wood can mean.
-    #[error("{shape}: its curves need more than {limit} chords of {chord_mm} mm; raise chord_mm or simplify it")]
+    #[error(
+        "{shape}: its curves need more than {limit} chords of {chord_mm} mm; raise chord_mm or simplify it"
+    )]
     TooFine {
         /// The shape.
         shape: String,
@@ -106,7 +108,9 @@ pub enum OutlineError {
         limit: usize,
     },
     /// A path that crosses itself without end.
-    #[error("{shape}: it crosses itself more than {limit} times, so it is a scribble and no outline; simplify it")]
+    #[error(
+        "{shape}: it crosses itself more than {limit} times, so it is a scribble and no outline; simplify it"
+    )]
     Scribble {
         /// The shape.
         shape: String,

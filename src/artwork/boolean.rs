@@ -106,7 +106,8 @@ fn overlay_of(subject: &[NodeRing], clip: &[NodeRing]) -> Overlay<i32> {
     // All points are kept: a vertex where rings touch must be a vertex of each of them. One thread and
     // one strategy, so that the same input gives the same bytes everywhere.
     let options = IntOverlayOptions::keep_all_points();
-    let solver = Solver { strategy: Strategy::Auto, precision: Precision::HIGH, multithreading: None };
+    let solver =
+        Solver { strategy: Strategy::Auto, precision: Precision::HIGH, multithreading: None };
     let mut overlay = Overlay::new_custom(edges, options, solver);
     for ring in subject {
         overlay.add_contour(ring, ShapeType::Subject);

@@ -38,8 +38,7 @@ impl Clip {
                     Some(own) => {
                         let mut part = Self::default();
                         part.gather(inner, at);
-                        part.inner =
-                            Some(Box::new(Self::of(own, at * affine(inner.transform()))));
+                        part.inner = Some(Box::new(Self::of(own, at * affine(inner.transform()))));
                         let tolerance = part.tolerance();
                         self.parts.push((part.flat(tolerance), FillRule::NonZero));
                     }
@@ -62,7 +61,9 @@ impl Clip {
 
     /// What the clip path lets through, as one path of straight lines for the non-zero rule.
     fn flat(&self, tolerance: f64) -> BezPath {
-        let Some(grid) = grid_round(self.parts.iter().map(|(p, _)| p)) else { return BezPath::new() };
+        let Some(grid) = grid_round(self.parts.iter().map(|(p, _)| p)) else {
+            return BezPath::new();
+        };
         let rings = self.rings(&grid, tolerance);
         path_of(&grid, &rings)
     }

@@ -90,8 +90,10 @@ impl Artwork {
         if more > 0 {
             there_is.push(format!("{more} more"));
         }
-        let only_open =
-            self.shapes.iter().any(|s| Shape { part: Part::Fill, ..s.clone() }.is_selected_by(&layer.select));
+        let only_open = self
+            .shapes
+            .iter()
+            .any(|s| Shape { part: Part::Fill, ..s.clone() }.is_selected_by(&layer.select));
         let hint = if only_open { " (it names open paths that paint nothing)" } else { "" };
         ArtworkError::NoMatch {
             layer: layer.name.clone(),
@@ -103,7 +105,11 @@ impl Artwork {
 
 /// The selector of a shape's paint.
 fn paint(shape: &Shape) -> Selector {
-    if shape.part == Part::Stroke { Selector::Stroke(shape.color) } else { Selector::Fill(shape.color) }
+    if shape.part == Part::Stroke {
+        Selector::Stroke(shape.color)
+    } else {
+        Selector::Fill(shape.color)
+    }
 }
 
 /// Area that a shape paints, in its units squared.

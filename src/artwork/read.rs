@@ -118,6 +118,7 @@ impl Walker<'_> {
                 usvg::Node::Path(path) => self.path(path, &scope)?,
                 usvg::Node::Text(text) => {
                     let element = self.known(text.id()).or(scope.element);
+                    fonts::check_glyphs(text, &self.name(element))?;
                     self.group(text.flattened(), &Scope { element, ..scope.clone() })?;
                 }
                 usvg::Node::Image(_) => self.odds.add(Odd::Bitmap, self.name(scope.element)),
@@ -253,8 +254,7 @@ impl Walker<'_> {
         let name = self.name(element);
         if is_open(curve) {
             let curve = scope.at * curve.clone();
-            let shape =
-                self.shape(Part::Open, &curve, FillRule::NonZero, Rgb(0, 0, 0), element);
+            let shape = self.shape(Part::Open, &curve, FillRule::NonZero, Rgb(0, 0, 0), element);
             self.shapes.push(shape);
             self.odds.add(Odd::OpenPath, name);
         } else {

@@ -27,13 +27,35 @@ const INKSCAPE: &str = "http://www.inkscape.org/namespaces/inkscape";
 
 /// Elements whose content is not painted where it stands.
 const NOT_PAINTED: [&str; 14] = [
-    "clipPath", "defs", "desc", "filter", "flowRoot", "foreignObject", "linearGradient", "marker", "mask",
-    "metadata", "pattern", "radialGradient", "symbol", "title",
+    "clipPath",
+    "defs",
+    "desc",
+    "filter",
+    "flowRoot",
+    "foreignObject",
+    "linearGradient",
+    "marker",
+    "mask",
+    "metadata",
+    "pattern",
+    "radialGradient",
+    "symbol",
+    "title",
 ];
 /// Elements that paint something by themselves.
 const PAINTING: [&str; 12] = [
-    "circle", "ellipse", "flowRoot", "foreignObject", "image", "line", "path", "polygon", "polyline", "rect",
-    "text", "use",
+    "circle",
+    "ellipse",
+    "flowRoot",
+    "foreignObject",
+    "image",
+    "line",
+    "path",
+    "polygon",
+    "polyline",
+    "rect",
+    "text",
+    "use",
 ];
 
 /// A checked document.
@@ -100,8 +122,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Source, ArtworkError> {
         nodes_limit: MAX_NODES,
         ..roxmltree::ParsingOptions::default()
     };
-    let document =
-        Document::parse_with_options(&text, options).map_err(|e| explain(&e))?;
+    let document = Document::parse_with_options(&text, options).map_err(|e| explain(&e))?;
     let lines = Lines::of(&text);
     let root = document.root_element();
     check_root(root, &lines)?;
@@ -384,9 +405,12 @@ fn check_values(node: Node, name: &str) -> Result<(), ArtworkError> {
         let checked = match (attribute.name(), node.tag_name().name()) {
             ("d", "path") => values::check_path(value),
             ("points", "polygon" | "polyline") => values::check_points(value),
-            ("transform" | "gradientTransform" | "patternTransform", _) => values::check_transform(value),
+            ("transform" | "gradientTransform" | "patternTransform", _) => {
+                values::check_transform(value)
+            }
             (
-                "x" | "y" | "width" | "height" | "rx" | "ry" | "cx" | "cy" | "r" | "x1" | "y1" | "x2" | "y2",
+                "x" | "y" | "width" | "height" | "rx" | "ry" | "cx" | "cy" | "r" | "x1" | "y1"
+                | "x2" | "y2",
                 "rect" | "circle" | "ellipse" | "line" | "use",
             )
             | ("stroke-width", _) => values::check_length(value),

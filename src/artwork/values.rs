@@ -224,7 +224,8 @@ pub(super) fn check_transform(value: &str) -> Result<(), Fault> {
         s.at += 1;
         let found = check_numbers(&mut s, Some(b')'))?;
         if !counts.contains(&found) {
-            let reason = format!("it has {found} numbers where {} belong", counts[counts.len() - 1]);
+            let reason =
+                format!("it has {found} numbers where {} belong", counts[counts.len() - 1]);
             return Err(Fault { at: from, reason });
         }
         s.at += 1;
@@ -298,7 +299,8 @@ mod tests {
 
     #[test]
     fn transforms_are_checked() {
-        for good in ["", "none", "translate(1)", "matrix(1 0 0 1,2 3) rotate(5, 1 2)", "skewX( 3 )"] {
+        for good in ["", "none", "translate(1)", "matrix(1 0 0 1,2 3) rotate(5, 1 2)", "skewX( 3 )"]
+        {
             assert_eq!(check_transform(good), Ok(()), "{good}");
         }
         for bad in ["scale(NaN)", "rotate(1 2)", "wobble(3)", "matrix(1 2", "translate 5"] {

@@ -90,9 +90,7 @@ impl Region {
                 return Err(RegionFault::HoleOutside { at });
             }
             let inside = |j: usize| {
-                j != i
-                    && boxes[j].contains(at)
-                    && contains_even_odd([self.holes[j].as_slice()], at)
+                j != i && boxes[j].contains(at) && contains_even_odd([self.holes[j].as_slice()], at)
             };
             if (0..self.holes.len()).any(inside) {
                 return Err(RegionFault::HoleInHole { at });

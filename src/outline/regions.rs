@@ -9,8 +9,8 @@
 //!         +-----+
 //! ```
 
-use super::{Region, RegionFault};
 use super::check::check_edges;
+use super::{Region, RegionFault};
 use crate::artwork::boolean::{FixedGrid, Node, NodeRing};
 use crate::geom::{Bounds, DVec2, Ring, bounds_of, contains_even_odd, signed_area};
 
@@ -22,7 +22,7 @@ pub(super) const PART_MM: f64 = 1e-4;
 const MERGE: f64 = 1e-6;
 
 /// Smallest area of a ring as a fraction of the square of the figure's diagonal.
-const LEAST: f64 = 1e-9;
+const LEAST: f64 = 2e-10;
 
 /// How often parting is tried again with a quarter of the move, where a neighbour is closer than that.
 const TRIES: i32 = 12;
@@ -114,8 +114,7 @@ impl Links {
                 let from = direction(&nodes, leaving, next[leaving]);
                 let nearest = (0..free.len()).min_by(|i, j| {
                     let (p, q) = (free[*i], free[*j]);
-                    let (p, q) =
-                        (direction(&nodes, p, prev[p]), direction(&nodes, q, prev[q]));
+                    let (p, q) = (direction(&nodes, p, prev[p]), direction(&nodes, q, prev[q]));
                     turn_order(from, p, q)
                 });
                 if let Some(k) = nearest {
@@ -224,11 +223,11 @@ fn nest(rings: Vec<Ring>) -> (Vec<Region>, usize) {
     let mut lost = 0;
     for hole in holes {
         let around = |i: &usize| {
-            boxes[*i].contains(hole[0]) && contains_even_odd([regions[*i].outer.as_slice()], hole[0])
+            boxes[*i].contains(hole[0])
+                && contains_even_odd([regions[*i].outer.as_slice()], hole[0])
         };
-        let smallest = (0..regions.len())
-            .filter(around)
-            .min_by(|i, j| areas[*i].total_cmp(&areas[*j]));
+        let smallest =
+            (0..regions.len()).filter(around).min_by(|i, j| areas[*i].total_cmp(&areas[*j]));
         match smallest {
             Some(i) => regions[i].holes.push(hole),
             None => lost += 1,

@@ -30,14 +30,20 @@ impl Odd {
         match self {
             Self::Bitmap => "not carved, a bitmap (trace it into paths first)",
             Self::Font => "text set in another font than it asks for",
-            Self::Foreign => "not carved, a text box that SVG readers do not know (Inkscape: Text, Convert to Text)",
+            Self::Foreign => {
+                "not carved, a text box that SVG readers do not know (Inkscape: Text, Convert to Text)"
+            }
             Self::SwitchedOff => "not carved, switched off by display: none",
             Self::Hidden => "not carved, hidden",
             Self::Invisible => "not carved, fully transparent",
             Self::ClippedAway => "not carved, nothing of it is left inside its clip path",
-            Self::Nothing => "not carved, it paints nothing (no size, an empty clip path, or a style that switches it off)",
+            Self::Nothing => {
+                "not carved, it paints nothing (no size, an empty clip path, or a style that switches it off)"
+            }
             Self::Unpainted => "not carved, closed but neither filled nor stroked",
-            Self::OpenPath => "kept but not carved, an open path that is neither filled nor stroked",
+            Self::OpenPath => {
+                "kept but not carved, an open path that is neither filled nor stroked"
+            }
             Self::OffPage => "outside the page, carved all the same (remove it if it is not meant)",
             Self::Pattern => "painted with a pattern, carved as if filled with its first colour",
             Self::Mask => "masked; masks are not applied, so the whole shape is carved",

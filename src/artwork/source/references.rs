@@ -13,7 +13,15 @@ const XLINK: &str = "http://www.w3.org/1999/xlink";
 
 /// Elements whose `href` is read while the artwork is resolved (links for readers, scripts and animations are not).
 const FOLLOWED: [&str; 9] = [
-    "feImage", "filter", "image", "linearGradient", "pattern", "radialGradient", "textPath", "tref", "use",
+    "feImage",
+    "filter",
+    "image",
+    "linearGradient",
+    "pattern",
+    "radialGradient",
+    "textPath",
+    "tref",
+    "use",
 ];
 
 /// Id of what a `use` draws, when it stands in this file.
@@ -100,7 +108,11 @@ fn urls(value: &str) -> impl Iterator<Item = &str> {
 fn without_font_faces(css: &str) -> String {
     let mut out = String::new();
     for (i, part) in css.split("/*").enumerate() {
-        out.push_str(if i == 0 { part } else { part.split_once("*/").map_or("", |(_, rest)| rest) });
+        out.push_str(if i == 0 {
+            part
+        } else {
+            part.split_once("*/").map_or("", |(_, rest)| rest)
+        });
     }
     while let Some(from) = out.find("@font-face") {
         let to = out[from..].find('}').map_or(out.len(), |len| from + len + 1);
@@ -181,12 +193,7 @@ impl<'a, 'd, F: Fn(Node) -> String> Graph<'a, 'd, F> {
         self.within(extent, node, depth)
     }
 
-    fn within(
-        &self,
-        extent: Extent,
-        node: Node,
-        depth: usize,
-    ) -> Result<Extent, ArtworkError> {
+    fn within(&self, extent: Extent, node: Node, depth: usize) -> Result<Extent, ArtworkError> {
         if depth + extent.depth > MAX_DEPTH {
             let line = node.document().text_pos_at(node.range().start).row;
             return Err(ArtworkError::TooDeep { line, limit: MAX_DEPTH });
@@ -213,10 +220,8 @@ impl<'a, 'd, F: Fn(Node) -> String> Graph<'a, 'd, F> {
             out.extend(local.map(str::to_owned));
         }
         let classes = node.attribute("class").unwrap_or_default().split_whitespace();
-        let words: Vec<&str> = classes
-            .chain(node.attribute("id"))
-            .chain([node.tag_name().name(), "*"])
-            .collect();
+        let words: Vec<&str> =
+            classes.chain(node.attribute("id")).chain([node.tag_name().name(), "*"]).collect();
         for rule in &self.rules {
             if words.iter().any(|w| rule.words.contains(*w)) {
                 out.extend(rule.targets.iter().cloned());
