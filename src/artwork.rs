@@ -306,7 +306,7 @@ pub enum ArtworkError {
          (font_dirs in [artwork]) or convert the text to paths"
     )]
     Glyph {
-        /// The text elements of the file.
+        /// The text element.
         element: String,
         /// The characters.
         characters: String,

@@ -118,6 +118,7 @@ impl Walker<'_> {
                 usvg::Node::Path(path) => self.path(path, &scope)?,
                 usvg::Node::Text(text) => {
                     let element = self.known(text.id()).or(scope.element);
+                    fonts::check_glyphs(text, &self.name(element))?;
                     self.group(text.flattened(), &Scope { element, ..scope.clone() })?;
                 }
                 usvg::Node::Image(_) => self.odds.add(Odd::Bitmap, self.name(scope.element)),

@@ -33,8 +33,8 @@ pub(super) enum Gone {
     Covered,
 }
 
-/// The notes on one layer.
-pub(super) fn of_layer(layer: &str, changes: &[Change], least_area: f64) -> Vec<String> {
+/// The notes on one layer, whose parts smaller than a square of `chord_mm` were left out.
+pub(super) fn of_layer(layer: &str, changes: &[Change], chord_mm: f64) -> Vec<String> {
     let mut out = Vec::new();
     let mut note = |picked: Vec<String>, one: &str, many: &str| {
         let words = if picked.len() == 1 { one } else { many };
@@ -48,23 +48,23 @@ pub(super) fn of_layer(layer: &str, changes: &[Change], least_area: f64) -> Vec<
     };
     note(
         pick(&|c| c.crossings > 0 && c.gone.is_none(), &resolved),
-        "path crosses itself and was resolved by its own fill rule",
-        "paths cross themselves and were resolved by their own fill rule",
+        "shape crosses itself and was resolved by its own fill rule",
+        "shapes cross themselves and were resolved by their own fill rule",
     );
     note(
         pick(&|c| c.touching > 0, &|c| format!("at {}", counted(c.touching, "place"))),
-        &format!("path touches itself and was parted there by {PART_MM} mm"),
-        &format!("paths touch themselves and were parted there by {PART_MM} mm"),
+        &format!("shape touches itself and was parted there by {PART_MM} mm"),
+        &format!("shapes touch themselves and were parted there by {PART_MM} mm"),
     );
     note(
         pick(&|c| c.slivers > 0 && c.gone.is_none(), &|c| counted(c.slivers, "sliver")),
-        &format!("path lost parts or holes below {least_area} mm^2"),
-        &format!("paths lost parts or holes below {least_area} mm^2"),
+        &format!("shape lost parts or holes too small to carve (below {chord_mm} mm square)"),
+        &format!("shapes lost parts or holes too small to carve (below {chord_mm} mm square)"),
     );
     note(
         pick(&|c| c.gone == Some(Gone::TooSmall), &|_| String::new()),
-        &format!("shape is too small to carve (below {least_area} mm^2) and was left out"),
-        &format!("shapes are too small to carve (below {least_area} mm^2) and were left out"),
+        &format!("shape is too small to carve (below {chord_mm} mm square) and was left out"),
+        &format!("shapes are too small to carve (below {chord_mm} mm square) and were left out"),
     );
     note(
         pick(&|c| c.gone == Some(Gone::Covered), &|_| String::new()),

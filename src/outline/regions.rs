@@ -22,7 +22,7 @@ pub(super) const PART_MM: f64 = 1e-4;
 const MERGE: f64 = 1e-6;
 
 /// Smallest area of a ring as a fraction of the square of the figure's diagonal.
-const LEAST: f64 = 1e-9;
+const LEAST: f64 = 2e-10;
 
 /// How often parting is tried again with a quarter of the move, where a neighbour is closer than that.
 const TRIES: i32 = 12;

@@ -60,12 +60,19 @@ struct Resolved {
     high: (i32, i32),
 }
 
+/// What is left of a shape before it is made into regions.
+struct Left {
+    rings: Vec<NodeRing>,
+    /// True when later shapes cover all of it.
+    covered: bool,
+}
+
 struct Tracer<'a> {
     shapes: &'a [Shape],
     grid: FixedGrid,
     /// For each shape that is needed.
     resolved: Vec<Option<Resolved>>,
-    least_area: f64,
+    chord_mm: f64,
 }
 
 impl<'a> Tracer<'a> {
@@ -85,7 +92,7 @@ impl<'a> Tracer<'a> {
             })
             .collect();
         let resolved = each.into_iter().collect::<Result<_, _>>()?;
-        Ok(Self { shapes: &placed.shapes, grid, resolved, least_area: chord_mm * chord_mm })
+        Ok(Self { shapes: &placed.shapes, grid, resolved, chord_mm })
     }
 
     fn layer(
@@ -95,16 +102,22 @@ impl<'a> Tracer<'a> {
     ) -> Result<(OutlineLayer, Vec<String>), OutlineError> {
         let rings_of = |&i: &usize| {
             let rings = self.resolved[i].as_ref().map_or(Vec::new(), |r| r.rings.clone());
-            if layer.visible { self.uncovered(i, rings) } else { rings }
+            if !layer.visible || rings.is_empty() {
+                return Left { rings, covered: false };
+            }
+            let rings = self.uncovered(i, rings);
+            Left { covered: rings.is_empty(), rings }
         };
         let traced: Vec<(Figure, Change)> = if layer.union {
-            let parts: Vec<Vec<NodeRing>> = indices.par_iter().map(rings_of).collect();
-            let melted = boolean::union(&parts.concat());
+            let parts: Vec<Left> = indices.par_iter().map(rings_of).collect();
+            let covered = parts.iter().all(|p| p.covered);
+            let all: Vec<NodeRing> = parts.into_iter().flat_map(|p| p.rings).collect();
+            let melted = Left { rings: boolean::union(&all), covered };
             let shape = match indices {
                 [one] => name(&self.shapes[*one]),
                 many => format!("the {} paths of the layer together", many.len()),
             };
-            vec![self.figure(shape, FillRule::NonZero, 0, &melted, layer.visible)?]
+            vec![self.figure(shape, FillRule::NonZero, 0, melted)?]
         } else {
             let each: Vec<_> = indices
                 .par_iter()
@@ -114,13 +127,13 @@ impl<'a> Tracer<'a> {
                     let own = shape.part == Part::Fill;
                     let crossings = self.resolved[*i].as_ref().map_or(0, |r| r.crossings);
                     let crossings = if own { crossings } else { 0 };
-                    self.figure(name(shape), shape.rule, crossings, &rings_of(i), layer.visible)
+                    self.figure(name(shape), shape.rule, crossings, rings_of(i))
                 })
                 .collect();
             each.into_iter().collect::<Result<_, _>>()?
         };
         let (figures, changes): (Vec<Figure>, Vec<Change>) = traced.into_iter().unzip();
-        let notes = notes::of_layer(&layer.name, &changes, self.least_area);
+        let notes = notes::of_layer(&layer.name, &changes, self.chord_mm);
         let figures: Vec<Figure> = figures.into_iter().filter(|f| !f.regions.is_empty()).collect();
         if figures.is_empty() {
             let why =
@@ -135,26 +148,21 @@ impl<'a> Tracer<'a> {
         shape: String,
         rule: FillRule,
         crossings: usize,
-        rings: &[NodeRing],
-        trimmed: bool,
+        left: Left,
     ) -> Result<(Figure, Change), OutlineError> {
-        let built = regions::build(rings, &self.grid, self.least_area)
+        let Left { rings, covered } = left;
+        let built = regions::build(&rings, &self.grid, self.chord_mm * self.chord_mm)
             .map_err(|fault| OutlineError::Unresolved { shape: shape.clone(), fault })?;
         let Built { regions, touching, slivers } = built;
-        let gone = match (regions.is_empty(), trimmed && rings.is_empty()) {
-            (false, _) => None,
-            (true, true) => Some(Gone::Covered),
-            (true, false) => Some(Gone::TooSmall),
-        };
-        let regions_now = regions.len();
+        let why = if covered { Gone::Covered } else { Gone::TooSmall };
         let change = Change {
             shape: shape.clone(),
             rule,
             crossings,
-            regions: regions_now,
+            regions: regions.len(),
             touching,
             slivers,
-            gone,
+            gone: regions.is_empty().then_some(why),
         };
         Ok((Figure { source: shape, regions }, change))
     }

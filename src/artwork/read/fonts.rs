@@ -22,47 +22,47 @@ struct Found {
     missing: Vec<String>,
     /// Family asked for, family given.
     replaced: Vec<(String, String)>,
-    /// Characters that no font has.
-    glyphs: Vec<char>,
 }
 
 impl Log {
     /// A resolver that takes a font only when the text names it or leaves it open (`serif`, nothing).
     pub(super) fn resolver(&self) -> FontResolver<'static> {
-        let (fonts, glyphs) = (self.0.clone(), self.0.clone());
-        let fallback = FontResolver::default_fallback_selector();
+        let found = self.0.clone();
         FontResolver {
-            select_font: Box::new(move |font, database| select(font, database, &mut lock(&fonts))),
-            select_fallback: Box::new(move |character, used, database| {
-                let found = fallback(character, used, database);
-                let mut log = lock(&glyphs);
-                let visible = !character.is_whitespace() && !character.is_control();
-                if found.is_none() && visible && !log.glyphs.contains(&character) {
-                    log.glyphs.push(character);
-                }
-                found
-            }),
+            select_font: Box::new(move |font, database| select(font, database, &mut lock(&found))),
+            select_fallback: FontResolver::default_fallback_selector(),
         }
     }
 
-    /// Refuses missing fonts and characters, notes replaced ones.
+    /// Refuses missing fonts, notes replaced ones.
     pub(super) fn settle(&self, source: &Source, odds: &mut Odds) -> Result<(), ArtworkError> {
         let found = lock(&self.0);
         let element = source.elements.named("text").join(", ");
         if let Some(family) = found.missing.first() {
             return Err(ArtworkError::Font { element, family: family.clone() });
         }
-        if !found.glyphs.is_empty() {
-            let characters: Vec<String> = found.glyphs.iter().map(|c| format!("'{c}'")).collect();
-            let plural = if characters.len() > 1 { "s" } else { "" };
-            let characters = characters.join(", ");
-            return Err(ArtworkError::Glyph { element, characters, plural });
-        }
         for (asked, given) in &found.replaced {
             odds.add(Odd::Font, format!("{asked} -> '{given}'"));
         }
         Ok(())
     }
+}
+
+/// Refuses a text with characters that no font has: they would be left out or become empty boxes.
+pub(super) fn check_glyphs(text: &usvg::Text, element: &str) -> Result<(), ArtworkError> {
+    let glyphs = text.layouted().iter().flat_map(|span| &span.positioned_glyphs);
+    let mut lost: Vec<String> = glyphs
+        .filter(|g| g.id.0 == 0 && !g.text.trim().is_empty())
+        .map(|g| format!("'{}'", g.text))
+        .collect();
+    lost.sort();
+    lost.dedup();
+    if lost.is_empty() {
+        return Ok(());
+    }
+    let plural = if lost.len() > 1 { "s" } else { "" };
+    let (element, characters) = (element.to_owned(), lost.join(", "));
+    Err(ArtworkError::Glyph { element, characters, plural })
 }
 
 fn lock(found: &Mutex<Found>) -> MutexGuard<'_, Found> {
