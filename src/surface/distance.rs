@@ -45,10 +45,10 @@ impl Segment {
 #[derive(Debug, Clone, Copy)]
 struct Sight {
     segment: u32,
-    /// Distance, mm.
-    d: f64,
-    /// Unit direction from the segment to the centre; zero when the centre lies on it.
-    u: DVec2,
+    /// Distance squared, mm^2.
+    square: f64,
+    /// From the segment's nearest point to the centre.
+    offset: DVec2,
 }
 
 /// A tile seen from its centre: the nearest segment and a bound on what the tile can hold.
@@ -150,41 +150,47 @@ impl Segments {
         });
     }
 
-    /// Looks from `c` at the segments `lists.kept[from..]` of a tile whose points lie within `r` of `c`,
+    /// Looks from `c` at the segments `lists.kept[range]` of a tile whose points lie within `r` of `c`,
     /// and appends the list of those that can be nearest to one of them.
-    pub(super) fn narrow(&self, c: DVec2, r: f64, from: usize, lists: &mut Lists) -> View {
+    pub(super) fn narrow(
+        &self,
+        c: DVec2,
+        r: f64,
+        range: std::ops::Range<usize>,
+        lists: &mut Lists,
+    ) -> View {
         let Lists { kept, seen } = lists;
         seen.clear();
-        let mut best = Sight { segment: 0, d: f64::INFINITY, u: DVec2::ZERO };
-        for &segment in &kept[from..] {
+        let mut nearest = f64::INFINITY;
+        for &segment in &kept[range] {
             let offset = self.list[segment as usize].offset(c);
-            let d = offset.length();
-            let u = if d > self.slack { offset / d } else { DVec2::ZERO };
-            let sight = Sight { segment, d, u };
-            if d < best.d {
-                best = sight;
-            }
-            seen.push(sight);
+            let square = offset.length_squared();
+            nearest = nearest.min(square);
+            seen.push(Sight { segment, square, offset });
         }
-        let far = best.d > r;
-        let bend = if far { r * r / (2.0 * best.d) } else { f64::INFINITY };
-        let mut upper = best.d + r;
-        for s in seen.iter() {
-            let ahead = s.d - best.d;
-            if ahead > 2.0 * r + self.slack {
+        let d = nearest.sqrt();
+        let reach = d + 2.0 * r + self.slack;
+        // Far off, directions count: a whole tile lies on the same side of what can be nearest.
+        if d <= r {
+            let near = seen.iter().filter(|s| s.square <= reach * reach);
+            kept.extend(near.map(|s| s.segment));
+            return View { d, upper: d + r + self.slack };
+        }
+        let first = seen.iter().find(|s| s.square == nearest);
+        let best = first.map_or(DVec2::ZERO, |s| s.offset / d);
+        let bend = r * r / (2.0 * d);
+        let mut upper = d + r;
+        for s in seen.iter().filter(|s| s.square <= reach * reach) {
+            let far = s.square.sqrt();
+            let u = s.offset / far;
+            if far - d > (u - best).length() * r + bend + self.slack {
                 continue;
             }
-            if far {
-                if ahead > (s.u - best.u).length() * r + bend + self.slack {
-                    continue;
-                }
-                // min of two distances <= their mean: walls that face each other bound the ridge.
-                let mean = 0.5 * (s.d + best.d) + 0.5 * r * (s.u + best.u).length() + bend;
-                upper = upper.min(mean);
-            }
+            // min of two distances <= their mean: walls that face each other bound the ridge.
+            upper = upper.min(0.5 * (far + d) + 0.5 * r * (u + best).length() + bend);
             kept.push(s.segment);
         }
-        View { d: best.d, upper: upper + self.slack }
+        View { d, upper: upper + self.slack }
     }
 }
 
@@ -210,7 +216,7 @@ impl<T: Copy, W: Fn(T) -> bool, F: Fn(f64) -> T> Walk<'_, T, W, F> {
         let last = self.grid.node(self.window.i0 + i1 - 1, self.window.j0 + j1 - 1);
         let end = lists.kept.len();
         let r = 0.5 * first.distance(last);
-        let view = self.segments.narrow((first + last) * 0.5, r, from, lists);
+        let view = self.segments.narrow((first + last) * 0.5, r, from..end, lists);
         if view.d - r > self.limit_mm {
             let beyond = (self.f)(view.d - r);
             for j in j0..j1 {

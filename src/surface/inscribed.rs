@@ -3,6 +3,7 @@
 use super::distance::{Lists, Segments};
 use crate::geom::DVec2;
 use crate::outline::Region;
+use std::ops::Range;
 
 /// Boxes looked at before the search settles for what it has: far above what real artwork needs.
 const MOST_BOXES: usize = 2_000_000;
@@ -18,15 +19,12 @@ pub fn inscribed_radius(region: &Region, segments: &Segments, tolerance_mm: f64)
         return 0.0;
     }
     let lists = Lists::all(segments);
-    let mut search = Search {
-        region,
-        segments,
-        lists,
-        best: 0.0,
-        tolerance_mm: tolerance_mm.max(1e-9),
-        boxes: 0,
-    };
-    search.visit(Area { center: bounds.center(), half: bounds.size() * 0.5 }, 0, None);
+    let tolerance_mm = tolerance_mm.max(1e-9);
+    let mut search = Search { region, segments, lists, best: 0.0, tolerance_mm, boxes: 0 };
+    let root = Area { center: bounds.center(), half: bounds.size() * 0.5 };
+    if let Some(area) = search.look(root, 0..segments.len(), None) {
+        search.divide(area);
+    }
     search.best
 }
 
@@ -62,30 +60,61 @@ struct Search<'a> {
     boxes: usize,
 }
 
+/// An area that may hold a better centre.
+#[derive(Debug, Clone)]
+struct Promising {
+    area: Area,
+    center: Known,
+    upper: f64,
+    /// Where its segments are listed.
+    listed: Range<usize>,
+}
+
 impl Search<'_> {
-    fn visit(&mut self, area: Area, from: usize, parent: Option<Known>) {
+    /// Looks at an area from its centre; `None` when it holds no better centre.
+    fn look(
+        &mut self,
+        area: Area,
+        listed: Range<usize>,
+        parent: Option<Known>,
+    ) -> Option<Promising> {
         self.boxes += 1;
-        let end = self.lists.kept.len();
+        if self.boxes > MOST_BOXES {
+            return None;
+        }
+        let start = self.lists.kept.len();
         let r = area.half.length();
-        let view = self.segments.narrow(area.center, r, from, &mut self.lists);
-        if view.upper > self.best + self.tolerance_mm && self.boxes < MOST_BOXES {
-            // No outline between the parent's centre and this one: both lie on the same side.
-            let same = parent.filter(|p| p.d > p.at.distance(area.center));
-            let inside =
-                same.map_or_else(|| self.region.contains(area.center), |known| known.inside);
-            let known = Known { at: area.center, d: view.d, inside };
-            if inside {
-                self.best = self.best.max(view.d);
-            }
-            // From outside, the way to any point of the box crosses the outline first.
-            let upper = if inside { view.upper } else { view.upper.min(r - view.d) };
-            if upper > self.best + self.tolerance_mm {
-                for half in area.halves() {
-                    self.visit(half, end, Some(known));
-                }
+        let view = self.segments.narrow(area.center, r, listed, &mut self.lists);
+        if view.upper <= self.best + self.tolerance_mm {
+            return None;
+        }
+        // No outline between the parent's centre and this one: both lie on the same side.
+        let same = parent.filter(|p| p.d > p.at.distance(area.center));
+        let inside = same.map_or_else(|| self.region.contains(area.center), |known| known.inside);
+        if inside {
+            self.best = self.best.max(view.d);
+        }
+        // From outside, the way to any point of the area crosses the outline first.
+        let upper = if inside { view.upper } else { view.upper.min(r - view.d) };
+        let center = Known { at: area.center, d: view.d, inside };
+        Some(Promising { area, center, upper, listed: start..self.lists.kept.len() })
+    }
+
+    /// Looks at both halves and goes on with the more promising one.
+    fn divide(&mut self, whole: Promising) {
+        let start = self.lists.kept.len();
+        let [a, b] = whole
+            .area
+            .halves()
+            .map(|half| self.look(half, whole.listed.clone(), Some(whole.center)));
+        let rank = |p: &Option<Promising>| p.as_ref().map_or(f64::NEG_INFINITY, |p| p.upper);
+        let order = if rank(&a) >= rank(&b) { [a, b] } else { [b, a] };
+        for half in order.into_iter().flatten() {
+            if half.upper > self.best + self.tolerance_mm {
+                self.divide(half);
             }
         }
-        self.lists.kept.truncate(end);
+        self.lists.kept.truncate(start);
     }
 }
 
