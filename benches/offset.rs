@@ -97,25 +97,34 @@ fn busy_ms() -> Option<f64> {
 
 /// The plain scalar loop over a table of the cutter, nodes only, for the middle rows of a field.
 fn plain_rows(field: &Heightfield, profile: &Profile, rows: usize) -> Vec<f32> {
-    let grid = field.grid();
-    let reach = (profile.radius_mm() / PITCH_MM + 1e-9) as isize;
-    let cutter: Vec<(isize, isize, f32)> = (-reach..=reach)
-        .flat_map(|dy| (-reach..=reach).map(move |dx| (dx, dy)))
+    let nx = field.grid().nx;
+    let reach = (profile.radius_mm() / PITCH_MM + 1e-9) as usize;
+    let wide = nx + 2 * reach;
+    let first = (field.grid().ny - rows) / 2;
+    // The rows that matter, with nothing beyond the rim.
+    let mut z = vec![f32::NEG_INFINITY; wide * (rows + 2 * reach)];
+    for (k, line) in z.chunks_exact_mut(wide).enumerate() {
+        if let Some(j) = (first + k).checked_sub(reach).filter(|&j| j < field.grid().ny) {
+            line[reach..reach + nx].copy_from_slice(field.row(j));
+        }
+    }
+    let cutter: Vec<(usize, f32)> = (0..=2 * reach)
+        .flat_map(|dy| (0..=2 * reach).map(move |dx| (dx, dy)))
         .filter_map(|(dx, dy)| {
-            let r = ((dx * dx + dy * dy) as f64).sqrt() * PITCH_MM;
-            Some((dx, dy, profile.height_at(r)? as f32))
+            let (x, y) = (dx as f64 - reach as f64, dy as f64 - reach as f64);
+            let rise = profile.height_at((x * x + y * y).sqrt() * PITCH_MM)?;
+            Some((dy * wide + dx, rise as f32))
         })
         .collect();
-    let (nx, ny) = (grid.nx as isize, grid.ny as isize);
-    let first = (ny - rows as isize) / 2;
-    let mut out = Vec::with_capacity(rows * grid.nx);
-    for y in first..first + rows as isize {
+    let mut out = Vec::with_capacity(rows * nx);
+    for y in 0..rows {
         for x in 0..nx {
+            let under = &z[y * wide + x..];
             let mut best = f32::NEG_INFINITY;
-            for &(dx, dy, rise) in &cutter {
-                let (qx, qy) = (x + dx, y + dy);
-                if qx >= 0 && qy >= 0 && qx < nx && qy < ny {
-                    best = best.max(field.z()[(qy * nx + qx) as usize] - rise);
+            for &(q, rise) in &cutter {
+                let tip = under[q] - rise;
+                if tip > best {
+                    best = tip;
                 }
             }
             out.push(best);
