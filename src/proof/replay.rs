@@ -69,7 +69,7 @@ impl Case<'_> {
         let lowest_mm = moves.iter().map(|m| m.to.z).fold(f64::INFINITY, f64::min);
         self.check_frame();
         let contacts = self.carve(block, lowest_mm);
-        for (m, c) in moves.iter().zip(&contacts) {
+        for (m, &c) in moves.iter().zip(&contacts) {
             self.check_move(m, c);
         }
         self.check_spindle(&contacts);
@@ -203,7 +203,7 @@ impl Case<'_> {
     }
 
     /// Feed, rapid, plunge, flute, bottom.
-    fn check_move(&mut self, m: &Move, c: &Contact) {
+    fn check_move(&mut self, m: &Move, c: Contact) {
         let deepest_mm = f64::from(c.deepest_mm);
         match m.kind {
             MoveKind::Rapid => {

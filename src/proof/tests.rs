@@ -8,6 +8,7 @@ use crate::job::{
 };
 use crate::stock::Block;
 use proptest::prelude::*;
+use std::fmt::Write;
 
 fn machine() -> Machine {
     Machine {
@@ -298,7 +299,7 @@ fn a_raster_on_a_plane_leaves_the_analytic_cusp() {
     for k in 0..60_i32 {
         let y = f64::from(k) * 0.4 - 2.0;
         let (a, b) = if k % 2 == 0 { (-2, 42) } else { (42, -2) };
-        text += &format!("G1 X{a} Y{y:.3}\nX{b}\n");
+        writeln!(text, "G1 X{a} Y{y:.3}\nX{b}").unwrap();
     }
     text += "G0 Z5\nM5\nM30\n";
     let grid = Grid::covering(DVec2::ZERO, 40.0, 20.0, 0.1).unwrap();

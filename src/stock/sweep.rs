@@ -321,64 +321,61 @@ impl Sweep {
             }
         }
     }
+}
 
-    /// The point that the spans and offsets of [`Sweep::spans`] and [`Sweep::left`] count from.
+impl Stamp {
+    /// The point that spans and offsets count from.
     pub(super) fn anchor(&self) -> DVec3 {
-        match self {
-            Self::Stamp(s) => s.at,
-            Self::Along(a) => a.low,
-        }
+        self.at
     }
 
-    /// The spans of x (relative to the anchor) to look at on the row `dy` above the anchor.
+    /// The spans of x to look at on the row `dy` above the anchor.
+    #[inline]
     pub(super) fn spans(&self, dy: f64) -> [Span; 4] {
-        const E: Span = Span::EMPTY;
-        match self {
-            Self::Stamp(s) => {
-                let mut out = [disc_row(s.tip.radius, dy), E, E, E];
-                for (behind, inside) in s.wedge.iter().flatten() {
-                    let row = behind.row(0.0, dy);
-                    if *inside {
-                        out = out.map(|o| o.meet(row));
-                    } else {
-                        let [a, b] = out[0].without(row);
-                        let [c, d] = out[1].without(row);
-                        out = [a, b, c, d];
-                    }
-                }
-                out
-            }
-            Self::Along(a) => {
-                let base = match a.look {
-                    [Some(_), Some(hi)] => a.dir.row(a.len + hi, dy),
-                    [None, Some(hi)] => a.stadium_row(dy).meet(a.dir.row(a.len + hi, dy)),
-                    [_, None] => a.stadium_row(dy),
-                };
-                let Some(lo) = a.look[0] else { return [base, E, E, E] };
-                let [left, right] = base.without(a.dir.row(-lo, dy));
-                [left, right, E, E]
+        let mut out = [disc_row(self.tip.radius, dy), Span::EMPTY, Span::EMPTY, Span::EMPTY];
+        for (behind, inside) in self.wedge.iter().flatten() {
+            let row = behind.row(0.0, dy);
+            if *inside {
+                out = out.map(|o| o.meet(row));
+            } else {
+                let [a, b] = out[0].without(row);
+                let [c, d] = out[1].without(row);
+                out = [a, b, c, d];
             }
         }
+        out
     }
 
     /// What it leaves at the node `d` from the anchor; `None` where it does not come.
     #[inline]
     pub(super) fn left(&self, d: DVec2) -> Option<Left> {
-        match self {
-            Self::Stamp(s) => {
-                let h2 = s.tip.radius * s.tip.radius - d.length_squared();
-                if h2 < 0.0 {
-                    return None;
-                }
-                let z = if s.tip.flat { s.at.z } else { s.at.z + s.tip.radius - h2.sqrt() };
-                Some(Left { z, tip: s.at.z })
-            }
-            Self::Along(a) => a.left(d),
+        let h2 = self.tip.radius * self.tip.radius - d.length_squared();
+        if h2 < 0.0 {
+            return None;
         }
+        let up = if self.tip.flat { 0.0 } else { self.tip.radius - h2.sqrt() };
+        Some(Left { z: self.at.z + up, tip: self.at.z })
     }
 }
 
 impl Along {
+    /// The point that spans and offsets count from.
+    pub(super) fn anchor(&self) -> DVec3 {
+        self.low
+    }
+
+    /// The spans of x to look at on the row `dy` above the anchor.
+    #[inline]
+    pub(super) fn spans(&self, dy: f64) -> [Span; 2] {
+        let base = match self.look {
+            [Some(_), Some(hi)] => self.dir.row(self.len + hi, dy),
+            [None, Some(hi)] => self.stadium_row(dy).meet(self.dir.row(self.len + hi, dy)),
+            [_, None] => self.stadium_row(dy),
+        };
+        let Some(lo) = self.look[0] else { return [base, Span::EMPTY] };
+        base.without(self.dir.row(-lo, dy))
+    }
+
     /// The part of the stadium (all that the cutter passes over) on the row `dy` above the lower end.
     fn stadium_row(&self, dy: f64) -> Span {
         let (u, r) = (self.dir.u, self.tip.radius);
@@ -404,8 +401,9 @@ impl Along {
         discs.hull(strip.meet(along))
     }
 
+    /// What it leaves at the node `d` from the anchor; `None` where it does not come.
     #[inline]
-    fn left(&self, d: DVec2) -> Option<Left> {
+    pub(super) fn left(&self, d: DVec2) -> Option<Left> {
         let u = self.dir.u;
         let r = self.tip.radius;
         let s = u.x * d.x + u.y * d.y;
