@@ -174,7 +174,7 @@ impl Canvas {
             return self.text(text, at, how);
         }
         let mut kept: Vec<char> = text.chars().collect();
-        while let Some(_) = kept.pop() {
+        while kept.pop().is_some() {
             let shorter: String = kept.iter().collect::<String>() + "...";
             if font::width_px(&shorter, how.capital_px) <= room_px {
                 return self.text(&shorter, at, how);

@@ -90,7 +90,7 @@ pub fn deviation_png(
     let px = |n: f32| (n * unit).round();
     let margin = px(70.0);
     let page_w = (image.w as f32 + 2.0 * margin).max(px(1180.0));
-    let (top, left) = (px(178.0), ((page_w - image.w as f32) * 0.5).floor());
+    let (top, left) = (px(206.0), ((page_w - image.w as f32) * 0.5).floor());
     let bottom = top + image.h as f32;
     let mut canvas = Canvas::new(page_w as usize, (bottom + px(250.0)) as usize)?;
     let room = page_w - 2.0 * margin;
@@ -99,9 +99,8 @@ pub fn deviation_png(
     let how = Lettering::body(px(21.0));
     let gouge = figures.gouge_text(grid, limits);
     let how_gouge = if over { how.colored(GOUGE[3].1) } else { how };
-    canvas.text_within(&gouge, (margin, px(136.0)), how_gouge, room * 0.46);
-    let right = (page_w - margin, px(136.0));
-    canvas.text_within(&figures.leftover_text(), right, how.aligned(Align::Right), room * 0.52);
+    canvas.text_within(&gouge, (margin, px(134.0)), how_gouge, room);
+    canvas.text_within(&figures.leftover_text(), (margin, px(174.0)), how, room);
     canvas.lay(&image, left as usize, top as usize);
     canvas.frame([left, top, image.w as f32, image.h as f32], px(2.0).max(1.0), FAINT_INK);
     if over {

@@ -48,9 +48,9 @@ impl Grain {
         // Fibres and pores: fine streaks along the grain, no finer than the pixels.
         let along = along + 4.0 * wobble;
         let streak = noise(along / 9.0, across / self.finest.max(0.32), z / 0.5, 3);
-        let fine = noise(along / 3.0, across / self.finest.max(0.2), z / 0.3, 4);
+        let fine = noise(along / 3.0, across / self.finest.max(0.2), 0.0, 4);
         // Ray flecks: short dark dashes.
-        let fleck = noise(along / 1.3, across / self.finest.max(0.26), z / 0.6, 5);
+        let fleck = noise(along / 1.3, across / self.finest.max(0.26), 0.0, 5);
         let fleck = ((fleck - 0.79) * 7.0).clamp(0.0, 1.0);
         (0.34 * late + 0.20 * streak + 0.14 * fine + 0.24 * fleck).min(1.0)
     }
@@ -66,15 +66,19 @@ fn noise(x: f32, y: f32, z: f32, seed: u32) -> f32 {
     let edge =
         |j: i32, k: i32| mix(lattice(i, j, k, seed), lattice(i.wrapping_add(1), j, k, seed), u);
     let near = mix(edge(j, k), edge(above, k), v);
+    if w <= 0.0 {
+        return near;
+    }
     let far = mix(edge(j, behind), edge(above, behind), v);
     mix(near, far, w)
 }
 
 /// The lattice point below `x`, and the smooth share of the next one.
 fn split(x: f32) -> (i32, f32) {
-    let floor = x.floor();
-    let t = x - floor;
-    (floor as i32, t * t * (3.0 - 2.0 * t))
+    let toward_zero = x as i32;
+    let below = if toward_zero as f32 > x { toward_zero.wrapping_sub(1) } else { toward_zero };
+    let t = x - below as f32;
+    (below, t * t * (3.0 - 2.0 * t))
 }
 
 /// A value between 0 and 1 that looks random.

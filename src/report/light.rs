@@ -169,6 +169,8 @@ fn shine(upright: &Terrain, turned: &Terrain, lights: &[Light], what: Gathers) -
 /// across it.
 fn sweep(t: &Terrain, light: Light, what: Gathers, sum: &mut [f32]) {
     const PAD: usize = 4;
+    // Beyond the rim there is nothing that could cast a shadow.
+    const NOTHING: f32 = -1.0e9;
     let aslant = light.x / light.y.abs();
     let step_px = (1.0 + aslant * aslant).sqrt();
     let ground = libm::hypot(light.x, light.y);
@@ -179,8 +181,6 @@ fn sweep(t: &Terrain, light: Light, what: Gathers, sum: &mut [f32]) {
     let (lx, ly, lz) = (light.x * light.share, light.y * light.share, light.z * light.share);
     let (lx, ly, lz) = (lx as f32, ly as f32, lz as f32);
     let share = light.share as f32;
-    // Beyond the rim there is nothing that could cast a shadow.
-    const NOTHING: f32 = -1.0e9;
     let mut before = vec![NOTHING; t.w + 2 * PAD];
     let mut dark = before.clone();
     for k in 0..t.h {

@@ -28,7 +28,7 @@ pub fn stl_every_nth_node(grid: &Grid) -> usize {
         let cells = |nodes: usize| nodes.saturating_sub(1).div_ceil(*n);
         triangles(cells(grid.nx), cells(grid.ny)).is_some_and(|t| t <= MOST_TRIANGLES)
     };
-    (1..).find(small_enough).unwrap_or(1)
+    (1..=grid.nx.max(grid.ny)).find(small_enough).unwrap_or(1)
 }
 
 /// The solid between the relief and a level base as a binary STL file, mm, closed, normals outwards.
