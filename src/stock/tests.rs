@@ -198,6 +198,37 @@ proptest! {
     }
 }
 
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 64, ..ProptestConfig::default() })]
+
+    /// Short moves with small turns, as fitted rasters and arcs have them: their wedges are thin.
+    #[test]
+    fn a_gently_winding_chain_equals_its_moves_alone(
+        turns in prop::collection::vec((-0.2f64..0.2, -0.3f64..0.3), 20..60),
+        heading in 0.0f64..6.3,
+        ball: bool,
+    ) {
+        let (mut heading, mut slope) = (heading, 0.0_f64);
+        let mut path = vec![[6.0, 5.0, -2.0]];
+        for (turn, bend) in turns {
+            heading += turn;
+            slope = (slope + bend).clamp(-2.0, 2.0);
+            let [x, y, z] = *path.last().unwrap();
+            let step = 0.12;
+            path.push([x + step * libm::cos(heading), y + step * libm::sin(heading), z + step * slope]);
+        }
+        let moves = chain(&path);
+        let profile = if ball { BALL } else { Profile::Flat { radius_mm: 1.6173 } };
+        let mut whole = block(0.1);
+        whole.cut(&profile, &moves);
+        let mut alone = block(0.1);
+        alone.cut_alone(&profile, &moves, |_| true);
+        for (k, (a, b)) in whole.field().z().iter().zip(alone.field().z()).enumerate() {
+            prop_assert!((a - b).abs() < 2e-6, "node {k}: chain {a}, alone {b}");
+        }
+    }
+}
+
 #[test]
 fn the_result_does_not_hang_on_the_number_of_threads() {
     let moves: Vec<Move> = (0..200)
