@@ -55,6 +55,10 @@ const BAND_ROWS: usize = 64;
 /// Widest wedge at a joint that counts as thin, nodes.
 const THIN_NODES: f64 = 2.0;
 
+/// Rapids carve with a cutter this much slimmer, mm: a retract from the end of a cut grazes nodes that lie just on
+/// the rim of the cut, and whether round-off puts them in or out must not look like a rapid through wood.
+const RAPID_SLIM_MM: f64 = 1e-5;
+
 /// Less than this removed at a node does not count as engagement, mm (rounding of the stored heights).
 const ENGAGED_FROM_MM: f64 = 1e-3;
 
@@ -104,6 +108,7 @@ impl Block {
     ) -> Vec<Contact> {
         let mut contacts = vec![Contact::default(); moves.len()];
         let tip = Tip::of(profile);
+        let slim = Tip::of(&profile.slimmed(RAPID_SLIM_MM));
         // A wedge up to a few nodes wide costs less as part of a strip than as a stamp of its own.
         let thin_mm = THIN_NODES * self.field.grid().pitch_mm;
         let joints: Vec<Joint> = (0..moves.len() + 1)
@@ -132,7 +137,8 @@ impl Block {
                     let i = k as usize;
                     let mut contact = Contact::default();
                     let ends = [joints[i], joints[i + 1]];
-                    band.carve(&Sweep::of(&moves[i], tip, ends), &mut contact);
+                    let tip_here = if moves[i].is_rapid() { slim } else { tip };
+                    band.carve(&Sweep::of(&moves[i], tip_here, ends), &mut contact);
                     if ends[1] == Joint::Wedge
                         && moves[i].to.z < top_mm
                         && let Some(wedge) = Sweep::wedge(&moves[i], &moves[i + 1], tip)

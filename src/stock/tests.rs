@@ -291,3 +291,21 @@ fn a_shank_wider_than_the_slot_touches_its_rim() {
     assert!(b.touch(1.5, 3.0, &slot).is_none(), "a thinner shank stays in the slot");
     assert!(b.touch(2.0, 4.0, &slot).is_none(), "a higher shank stays above the wood");
 }
+
+#[test]
+fn a_retract_from_the_end_of_a_cut_meets_no_wood() {
+    // Nodes just on the rim of a flat cutter at the end of its cut.
+    let grid = Grid::covering(DVec2::ZERO, 60.0, 40.0, 0.1).unwrap();
+    for end in [50.4, 23.7, 31.1] {
+        let at = |x: f64, z: f64| DVec3::new(x, 20.1, z);
+        let feed = MoveKind::Feed { feed_mm_per_min: 500.0 };
+        let moves = [
+            Move { from: at(10.0, -1.533), to: at(end, -1.533), kind: feed, line: 1 },
+            Move { from: at(end, -1.533), to: at(end, 5.0), kind: MoveKind::Rapid, line: 2 },
+        ];
+        let mut block = Block::from_field(&stock(), Heightfield::flat(grid, 0.0));
+        let met = block.cut(&Profile::Flat { radius_mm: 1.5 }, &moves);
+        assert!(met[0].deepest_mm > 1.5);
+        assert_eq!(met[1], Contact::default(), "{end}");
+    }
+}
