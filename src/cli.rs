@@ -3,9 +3,11 @@
 mod carve;
 mod check;
 mod files;
+mod inputs;
 mod lists;
 mod new;
 mod observe;
+mod outcome;
 
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
@@ -54,8 +56,6 @@ enum Stop {
     Refused(anyhow::Error),
     /// A check of the finished programs failed: exit code 4.
     CheckFailed(String),
-    /// Ctrl-C: exit code 130.
-    Interrupted,
 }
 
 impl<E: Into<anyhow::Error>> From<E> for Stop {
@@ -84,16 +84,15 @@ pub fn main() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(Stop::Refused(e)) if is_broken_pipe(&e) => ExitCode::SUCCESS,
         Err(Stop::Refused(e)) => {
-            observe::complain(&format!("error: {e:#}"));
+            let text = format!("{e:#}");
+            // The pictures of job faults bring their own heading.
+            let heading = if text.starts_with("error") { "" } else { "error: " };
+            observe::complain(&format!("{heading}{text}"));
             ExitCode::from(BAD_INPUT)
         }
         Err(Stop::CheckFailed(text)) => {
             observe::complain(&text);
             ExitCode::from(CHECK_FAILED)
-        }
-        Err(Stop::Interrupted) => {
-            observe::complain("interrupted: nothing was written");
-            ExitCode::from(INTERRUPTED)
         }
     }
 }

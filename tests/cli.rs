@@ -90,7 +90,7 @@ scallop_mm = 0.02
 
 const OUTPUTS: [&str; 10] = [
     "1-rough-flat-6.nc",
-    "2-raster-ball-3.nc",
+    "2-finish-ball-3.nc",
     "carved.png",
     "depth.png",
     "deviation.png",
@@ -165,7 +165,8 @@ fn artwork_alone_is_carved_with_defaults() {
     desk.put("small.toml", ""); // an unrelated file beside it
     let out = desk.run(&["carve", "leaf.svg", "--out", "made"]);
     assert_eq!(out.status.code(), Some(0), "{}", stderr(&out));
-    assert!(stderr(&out).contains("150 mm"), "the default size is said aloud: {}", stderr(&out));
+    let said = String::from_utf8_lossy(&out.stdout);
+    assert!(said.contains("150 mm"), "the default size is said aloud: {said}");
     let files = desk.files();
     assert!(files.contains_key("made/relief.png"));
     assert!(!files.contains_key("leaf-carving"));
@@ -174,17 +175,12 @@ fn artwork_alone_is_carved_with_defaults() {
 #[test]
 fn the_resolved_job_repeats_the_run() {
     let desk = leaf_desk();
-    assert_eq!(desk.run(&["carve", "leaf.toml"]).status.code(), Some(0));
-    let job = desk.dir.path().join("leaf-carving/job.toml");
-    std::fs::copy(&job, desk.dir.path().join("again.toml")).unwrap();
-    let out = desk.run(&["carve", "again.toml"]);
+    assert_eq!(desk.run(&["carve", "leaf.toml", "--out", "a/b"]).status.code(), Some(0));
+    let out = desk.run(&["carve", "a/b/job.toml", "--out", "again"]);
     assert_eq!(out.status.code(), Some(0), "{}", stderr(&out));
     let files = desk.files();
-    for name in ["1-rough-flat-6.nc", "2-raster-ball-3.nc", "relief.stl", "job.toml"] {
-        assert!(
-            files[&format!("leaf-carving/{name}")] == files[&format!("again-carving/{name}")],
-            "{name}"
-        );
+    for name in ["1-rough-flat-6.nc", "2-finish-ball-3.nc", "relief.stl", "depth.png"] {
+        assert!(files[&format!("a/b/{name}")] == files[&format!("again/{name}")], "{name}");
     }
 }
 
@@ -252,13 +248,13 @@ fn job_with(old: &str, new: &str) -> Desk {
 #[test]
 fn job_faults_point_at_line_and_column() {
     let cases: [(&str, &str, &[&str]); 9] = [
-        ("depth_mm = 4", "dept_mm = 4", &["leaf.toml:10:1", "dept_mm", "depth_mm"]),
-        ("depth_mm = 4", "depth_mm = \"deep\"", &["leaf.toml:10:12"]),
-        ("depth_mm = 4", "depth_mm = -4", &["leaf.toml:10:12", "depth_mm"]),
-        ("depth_mm = 4", "depth_mm = nan", &["leaf.toml:10:12"]),
-        ("depth_mm = 4", "depth_in = 0.2", &["leaf.toml:10:1", "depth_mm"]),
-        ("depth_mm = 4", "depth_mm = 1e300", &["leaf.toml:10:12"]),
-        ("depth_mm = 4", "depth_mm = = 4", &["leaf.toml:10"]),
+        ("depth_mm = 4", "dept_mm = 4", &["leaf.toml:11:1", "dept_mm", "depth_mm"]),
+        ("depth_mm = 4", "depth_mm = \"deep\"", &["leaf.toml:11:12"]),
+        ("depth_mm = 4", "depth_mm = -4", &["leaf.toml:11:12", "depth_mm"]),
+        ("depth_mm = 4", "depth_mm = nan", &["leaf.toml:11:12"]),
+        ("depth_mm = 4", "depth_in = 0.2", &["leaf.toml:11:1", "depth_mm"]),
+        ("depth_mm = 4", "depth_mm = 1e300", &["leaf.toml:11:12"]),
+        ("depth_mm = 4", "depth_mm = = 4", &["leaf.toml:11"]),
         ("cutter = \"flat-6\"", "cutter = \"flat-7\"", &["flat-7", "flat-6"]),
         ("title = \"Leaf\"", "machine = \"shapeoko\"", &["leaf.toml:2:11", "shapeoko3"]),
     ];
@@ -383,5 +379,5 @@ fn a_failed_check_writes_nothing_and_exits_with_four() {
         .replace("title = \"Leaf\"", "strict = true");
     let desk = leaf_desk();
     desk.put("leaf.toml", text);
-    refused(&desk, &["carve", "leaf.toml"], 4, &["leftover"]);
+    refused(&desk, &["carve", "leaf.toml"], 4, &["are left above"]);
 }

@@ -1,22 +1,27 @@
 //! Reading inputs and writing outputs. Outputs of one run appear together or not at all.
 
+use super::{INTERRUPTED, observe};
 use anyhow::{Context, Result, bail};
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// Largest input file taken on, bytes.
 const LARGEST_INPUT: u64 = 512 << 20;
 
 /// Reads a whole input file.
 pub(super) fn read(path: &Path) -> Result<Vec<u8>> {
-    let meta = fs::metadata(path)
-        .with_context(|| format!("cannot read {}", path.display()))?;
+    let meta = fs::metadata(path).with_context(|| format!("cannot read {}", path.display()))?;
     if meta.is_dir() {
         bail!("{} is a folder; give a file", path.display());
     }
     if meta.len() > LARGEST_INPUT {
-        bail!("{} has {} MiB, more than the {} MiB that are read; simplify it", path.display(),
-            meta.len() >> 20, LARGEST_INPUT >> 20);
+        bail!(
+            "{} has {} MiB, more than the {} MiB that are read; simplify it",
+            path.display(),
+            meta.len() >> 20,
+            LARGEST_INPUT >> 20
+        );
     }
     fs::read(path).with_context(|| format!("cannot read {}", path.display()))
 }
@@ -34,39 +39,75 @@ pub(super) fn read_text(path: &Path) -> Result<String> {
     }
 }
 
-/// The files of one run, gathered in a folder beside their destination and moved in at the end.
+/// How a job file in `folder` names `file`: by a relative path where there is one, with `/` between.
+pub(super) fn name_from(folder: &Path, file: &Path) -> Result<String> {
+    let full = |p: &Path| {
+        fs::canonicalize(p).with_context(|| format!("cannot find {} again", p.display()))
+    };
+    let (folder, file) = (full(folder)?, full(file)?);
+    let common = folder.components().zip(file.components()).take_while(|(a, b)| a == b).count();
+    if common == 0 {
+        return Ok(file.display().to_string()); // another drive
+    }
+    let up = folder.components().skip(common).map(|_| "..".to_string());
+    let down = file.components().skip(common).map(|c| c.as_os_str().to_string_lossy().into_owned());
+    Ok(up.chain(down).collect::<Vec<_>>().join("/"))
+}
+
+/// The files of one run, gathered in a folder inside their destination and moved in at the end.
 #[derive(Debug)]
 pub(super) struct Outputs {
     folder: PathBuf,
-    staging: PathBuf,
-    made_folder: bool,
     names: Vec<String>,
-    committed: bool,
+    staging: Arc<Mutex<Staging>>,
+}
+
+/// What has to go when the run ends early: by an error, or by a signal on another thread.
+#[derive(Debug)]
+struct Staging {
+    path: PathBuf,
+    /// The folders that this run made, innermost first.
+    made: Vec<PathBuf>,
+}
+
+impl Staging {
+    fn remove(&self) {
+        fs::remove_dir_all(&self.path).ok();
+        for folder in &self.made {
+            fs::remove_dir(folder).ok(); // only when empty
+        }
+    }
 }
 
 impl Outputs {
-    /// Prepares `folder` (made when missing); fails when it cannot be written.
+    /// Prepares `folder` (made when missing); fails when it cannot be written. From here on Ctrl-C,
+    /// SIGTERM and SIGHUP take away what was begun and end the process with exit code 130.
     pub(super) fn prepare(folder: &Path) -> Result<Self> {
-        let made_folder = !folder.exists();
-        let cure = || format!("cannot write into {}; choose another folder with --out", folder.display());
-        fs::create_dir_all(folder).with_context(cure)?;
-        let staging = folder.join(format!(".relievo-{}", std::process::id()));
-        let outputs = Self {
-            folder: folder.to_path_buf(),
-            staging: staging.clone(),
-            made_folder,
-            names: Vec::new(),
-            committed: false,
-        };
-        fs::create_dir(&staging).with_context(cure)?;
+        let missing = |p: &&Path| !p.as_os_str().is_empty() && !p.exists();
+        let made = folder.ancestors().take_while(missing).map(Path::to_path_buf).collect();
+        let cure =
+            || format!("cannot write into {}; choose another folder with --out", folder.display());
+        let path = folder.join(format!(".relievo-{}", std::process::id()));
+        let staging = Arc::new(Mutex::new(Staging { path: path.clone(), made }));
+        let outputs = Self { folder: folder.to_path_buf(), names: Vec::new(), staging };
+        fs::create_dir_all(&path).with_context(cure)?;
+        let for_signals = Arc::clone(&outputs.staging);
+        // Fails only when a handler is set already: then the first run of this process has set it.
+        let _ = ctrlc::set_handler(move || {
+            // Waits while files are being moved in: that is never cut short.
+            let staging = for_signals.lock().unwrap_or_else(PoisonError::into_inner);
+            staging.remove();
+            observe::complain("interrupted: nothing was written");
+            std::process::exit(i32::from(INTERRUPTED));
+        });
         Ok(outputs)
     }
 
     /// Adds one file.
     pub(super) fn add(&mut self, name: &str, bytes: &[u8]) -> Result<()> {
-        let path = self.staging.join(name);
+        use std::io::Write;
+        let path = self.staged(name);
         let write = || -> std::io::Result<()> {
-            use std::io::Write;
             let mut file = fs::File::create(&path)?;
             file.write_all(bytes)?;
             file.sync_all()
@@ -78,7 +119,15 @@ impl Outputs {
 
     /// Moves all files in and takes away programs of an earlier run that this one did not make, so that
     /// the folder never holds programs of two different jobs.
-    pub(super) fn commit(mut self) -> Result<()> {
+    pub(super) fn commit(self) -> Result<()> {
+        let staging = Arc::clone(&self.staging);
+        let held = staging.lock().unwrap_or_else(PoisonError::into_inner); // signals wait
+        let done = self.move_in(&held.path);
+        drop(held);
+        done
+    }
+
+    fn move_in(&self, staged: &Path) -> Result<()> {
         for name in &self.names {
             let to = self.folder.join(name);
             if to.is_dir() {
@@ -91,12 +140,14 @@ impl Outputs {
         }
         for name in &self.names {
             let to = self.folder.join(name);
-            fs::rename(self.staging.join(name), &to)
+            fs::rename(staged.join(name), &to)
                 .with_context(|| format!("cannot write {}", to.display()))?;
         }
-        fs::remove_dir_all(&self.staging).ok();
-        self.committed = true;
         Ok(())
+    }
+
+    fn staged(&self, name: &str) -> PathBuf {
+        self.staging.lock().unwrap_or_else(PoisonError::into_inner).path.join(name)
     }
 
     fn programs_of_earlier_runs(&self) -> Result<Vec<PathBuf>> {
@@ -126,12 +177,8 @@ fn starts_with_our_header(path: &Path) -> bool {
 
 impl Drop for Outputs {
     fn drop(&mut self) {
-        if !self.committed {
-            fs::remove_dir_all(&self.staging).ok();
-            if self.made_folder {
-                fs::remove_dir(&self.folder).ok(); // only when empty
-            }
-        }
+        // After a commit the staging folder is empty and the destination is not.
+        self.staging.lock().unwrap_or_else(PoisonError::into_inner).remove();
     }
 }
 

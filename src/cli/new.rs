@@ -1,14 +1,14 @@
 //! `relievo new ART.svg`: a commented job file, one layer for each colour found, ready to edit.
 
-use super::{Stop, carve, files, lists, observe};
-use crate::job::{self, Draft};
-use anyhow::{Context, bail};
-use std::path::{Path, PathBuf};
+use super::{Stop, inputs, observe};
+use crate::job;
+use anyhow::{Context, anyhow};
+use std::path::PathBuf;
 
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  relievo new rose.svg        writes rose.toml")]
 pub(super) struct Args {
-    /// The artwork (SVG)
+    /// The artwork (.svg, .svgz)
     artwork: PathBuf,
 
     /// Where to write (default: beside the artwork, ART.toml)
@@ -21,12 +21,39 @@ pub(super) struct Args {
 }
 
 pub(super) fn run(args: &Args) -> Result<(), Stop> {
-    let out = args.out.clone().unwrap_or_else(|| args.artwork.with_extension("toml"));
-    if out.exists() {
-        return Err(anyhow::anyhow!("{} is there already; choose another name with --out", out.display()).into());
+    if args.artwork.extension().is_some_and(|e| e == "toml") {
+        return Err(anyhow!(
+            "{} is a job file already; give artwork (.svg)",
+            args.artwork.display()
+        )
+        .into());
     }
-    let _ = (carve::is_job as fn(&Path) -> bool, job::defaults_table as fn() -> String, Draft::for_artwork);
-    let _ = (files::read as fn(&Path) -> anyhow::Result<Vec<u8>>, lists::library as fn(Option<&Path>) -> _, observe::say as fn(&str) -> _);
-    let _: anyhow::Result<()> = (|| bail!("")) ().context("");
+    let out = args.out.clone().unwrap_or_else(|| args.artwork.with_extension("toml"));
+    let input = inputs::load(&args.artwork)?;
+    let name = args.artwork.file_name().unwrap_or_default().to_string_lossy();
+    let text = job::template(&name, &input.artwork.found(), &input.library)?;
+    write_new(&out, &text)?;
+    if !args.quiet {
+        observe::say(&format!(
+            "{} written; edit it, then: relievo carve {}",
+            out.display(),
+            out.display()
+        ))?;
+    }
     Ok(())
+}
+
+/// Writes a file that must not be there yet.
+fn write_new(path: &std::path::Path, text: &str) -> anyhow::Result<()> {
+    use std::io::Write;
+    let mut file = match std::fs::File::create_new(path) {
+        Err(e) if e.kind() == std::io::ErrorKind::AlreadyExists => {
+            return Err(anyhow!(
+                "{} is there already; choose another name with --out",
+                path.display()
+            ));
+        }
+        file => file.with_context(|| format!("cannot write {}", path.display()))?,
+    };
+    file.write_all(text.as_bytes()).with_context(|| format!("cannot write {}", path.display()))
 }

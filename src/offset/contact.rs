@@ -1,0 +1,98 @@
+//! Where a cutter that comes straight down first touches one facet or one edge.
+//!
+//! Every point is given relative to the cutter's axis, so the axis stands at (0, 0). A contact is the
+//! height of the cutter's TIP at the moment of touch; [`f64::NEG_INFINITY`] says that it never touches.
+//! The surface minus the profile is concave over a facet and over an edge: its highest value is either
+//! the one place where its slope vanishes, or it lies on the border, that is on an edge or a vertex
+//! (the vertex, edge and facet drops of OpenCAMLib, Wallin 2007-2018, in closed form).
+
+use crate::cutter::Profile;
+use crate::geom::DVec2;
+
+/// How far beyond its radius a cutter still counts as touching, mm: round-off of coordinates.
+pub(super) const TOUCH_MM: f64 = 1e-9;
+
+/// The heights of a cell's corners and where its lower-left node lies, relative to the axis.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Cell {
+    /// Lower-left node, mm.
+    pub at: DVec2,
+    /// Side, mm.
+    pub pitch_mm: f64,
+    /// Heights at (0,0), (1,0), (0,1), (1,1), mm.
+    pub z: [f64; 4],
+}
+
+impl Cell {
+    /// Tip height at which the cutter touches the two facets and five edges of the cell.
+    pub(super) fn touch(&self, profile: &Profile) -> f64 {
+        let [z00, z10, z01, z11] = self.z;
+        let (a, p) = (self.at, self.pitch_mm);
+        let (b, c, d) = (a + DVec2::X * p, a + DVec2::Y * p, a + DVec2::splat(p));
+        self.touch_facets(profile)
+            .max(edge(profile, a, z00, b, z10))
+            .max(edge(profile, a, z00, c, z01))
+            .max(edge(profile, a, z00, d, z11))
+            .max(edge(profile, b, z10, d, z11))
+            .max(edge(profile, c, z01, d, z11))
+    }
+
+    /// Tip height at which the cutter touches the inside of one of the two facets.
+    pub(super) fn touch_facets(&self, profile: &Profile) -> f64 {
+        let [z00, z10, z01, z11] = self.z;
+        let lower = DVec2::new(z10 - z00, z11 - z10) / self.pitch_mm;
+        let upper = DVec2::new(z11 - z01, z01 - z00) / self.pitch_mm;
+        let mut best = f64::NEG_INFINITY;
+        for (slope, is_lower) in [(lower, true), (upper, false)] {
+            let (contact, tip) = match *profile {
+                Profile::Ball { radius_mm } => {
+                    let stretch = (1.0 + slope.length_squared()).sqrt();
+                    (slope * (radius_mm / stretch), radius_mm * (stretch - 1.0))
+                }
+                // The highest point of a tilted disc is its rim point uphill.
+                Profile::Flat { radius_mm } => {
+                    let steepness = slope.length();
+                    let contact =
+                        if steepness > 0.0 { slope * (radius_mm / steepness) } else { DVec2::ZERO };
+                    (contact, radius_mm * steepness)
+                }
+            };
+            let inside = (contact - self.at) / self.pitch_mm;
+            let (long, short) = if is_lower { (inside.x, inside.y) } else { (inside.y, inside.x) };
+            if short >= 0.0 && short <= long && long <= 1.0 {
+                best = best.max(z00 - slope.dot(self.at) + tip);
+            }
+        }
+        best
+    }
+}
+
+/// Tip height at which the cutter touches the edge from `a` to `b`, ends included.
+pub(super) fn edge(profile: &Profile, a: DVec2, za: f64, b: DVec2, zb: f64) -> f64 {
+    let length = (b - a).length();
+    let along = (b - a) / length;
+    let slope = (zb - za) / length;
+    let across = along.perp_dot(a);
+    let radius = profile.radius_mm();
+    if across.abs() > radius + TOUCH_MM {
+        return f64::NEG_INFINITY;
+    }
+    // The line under the cutter is the chord of half width w around the foot of the axis.
+    let foot = -along.dot(a);
+    let w_squared = (radius * radius - across * across).max(0.0);
+    let w = w_squared.sqrt();
+    let free = match *profile {
+        Profile::Ball { .. } => foot + slope * w / (1.0 + slope * slope).sqrt(),
+        Profile::Flat { .. } => foot + if slope < 0.0 { -w } else { w },
+    };
+    let s = free.clamp(0.0, length);
+    let off = (s - foot).abs();
+    if off > w + TOUCH_MM {
+        return f64::NEG_INFINITY;
+    }
+    let z = za + slope * s;
+    match *profile {
+        Profile::Ball { .. } => z - radius + (w_squared - off * off).max(0.0).sqrt(),
+        Profile::Flat { .. } => z,
+    }
+}

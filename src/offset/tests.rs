@@ -1,0 +1,338 @@
+//! The offset against a plain drop cutter that shares no code with it.
+
+use super::field::{nodes_only, tip_field_on};
+use super::simd::Path;
+use super::*;
+use crate::cutter::Profile;
+use crate::geom::{DVec2, DVec3, Grid, Heightfield};
+use proptest::prelude::*;
+
+const BALL_3: Profile = Profile::Ball { radius_mm: 1.5 };
+const FLAT_3: Profile = Profile::Flat { radius_mm: 1.5 };
+
+/// Height of the tip when the cutter touches the triangle's points alone: sampled, then refined.
+fn oracle_edge(profile: &Profile, a: DVec3, b: DVec3, p: DVec2) -> f64 {
+    // |a + t (b - a) - p|^2 <= R^2 in the plane.
+    let (d, e) = ((b - a).truncate(), a.truncate() - p);
+    let r = profile.radius_mm();
+    let (qa, qb, qc) = (d.dot(d), e.dot(d), e.dot(e) - r * r);
+    let disc = qb * qb - qa * qc;
+    if disc < 0.0 {
+        return f64::NEG_INFINITY;
+    }
+    let (mut lo, mut hi) = ((-qb - disc.sqrt()) / qa, (-qb + disc.sqrt()) / qa);
+    (lo, hi) = (lo.max(0.0), hi.min(1.0));
+    if lo > hi {
+        return f64::NEG_INFINITY;
+    }
+    let tip = |t: f64| {
+        let q = a + (b - a) * t;
+        q.z - profile.height_at((q.truncate() - p).length().min(r)).unwrap()
+    };
+    let ends = tip(lo).max(tip(hi));
+    // The surface minus the profile is concave along the edge: thirds close in on its top.
+    for _ in 0..120 {
+        let (u, v) = (lo + (hi - lo) / 3.0, hi - (hi - lo) / 3.0);
+        if tip(u) < tip(v) { lo = u } else { hi = v }
+    }
+    ends.max(tip(lo))
+}
+
+fn oracle_facet(profile: &Profile, t: [DVec3; 3], p: DVec2) -> f64 {
+    let n = (t[1] - t[0]).cross(t[2] - t[0]).normalize();
+    let n = if n.z < 0.0 { -n } else { n };
+    let r = profile.radius_mm();
+    let contact = match profile {
+        Profile::Ball { .. } => p - n.truncate() * r,
+        Profile::Flat { .. } => p - n.truncate().normalize_or_zero() * r,
+    };
+    let turn = |u: DVec3, v: DVec3| (v - u).truncate().perp_dot(contact - u.truncate());
+    let turns = [turn(t[0], t[1]), turn(t[1], t[2]), turn(t[2], t[0])];
+    if turns.iter().any(|&s| s < 0.0) && turns.iter().any(|&s| s > 0.0) {
+        return f64::NEG_INFINITY;
+    }
+    let to = contact - t[0].truncate();
+    let z = t[0].z - (n.x * to.x + n.y * to.y) / n.z;
+    z - profile.height_at(contact.distance(p).min(r)).unwrap()
+}
+
+/// The plain drop cutter: every triangle, every edge.
+fn oracle(surface: &Heightfield, profile: &Profile, p: DVec2) -> f64 {
+    let grid = surface.grid();
+    let node = |i: usize, j: usize| grid.node(i, j).extend(f64::from(surface.at(i, j)));
+    let mut best = f64::NEG_INFINITY;
+    let reach = profile.radius_mm() + 2.0 * grid.pitch_mm;
+    for j in 0..grid.ny - 1 {
+        for i in 0..grid.nx - 1 {
+            if (grid.node(i, j) - p).abs().max_element() > reach {
+                continue;
+            }
+            let (a, b, c, d) = (node(i, j), node(i + 1, j), node(i + 1, j + 1), node(i, j + 1));
+            for t in [[a, b, c], [a, c, d]] {
+                best = best.max(oracle_facet(profile, t, p));
+                for (u, v) in [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])] {
+                    best = best.max(oracle_edge(profile, u, v, p));
+                }
+            }
+        }
+    }
+    best
+}
+
+/// Repeatable numbers in 0..1 (SplitMix64, Steele et al. 2014).
+struct Dice(u64);
+
+impl Dice {
+    fn roll(&mut self) -> f64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut x = self.0;
+        x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((x ^ (x >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
+    }
+}
+
+fn grid(nodes_x: usize, nodes_y: usize, pitch_mm: f64) -> Grid {
+    let mm = |nodes: usize| (nodes - 1) as f64 * pitch_mm;
+    Grid::covering(DVec2::new(-0.731, 2.077), mm(nodes_x), mm(nodes_y), pitch_mm).unwrap()
+}
+
+/// The surfaces that every law is checked on.
+fn surfaces(nodes: usize, pitch_mm: f64) -> Vec<(&'static str, Heightfield)> {
+    let grid = grid(nodes, nodes * 3 / 4, pitch_mm);
+    let (lo, size) = (grid.origin, grid.bounds().size());
+    let mut dice = Dice(nodes as u64);
+    let mut noise = |amplitude: f64| {
+        let z = (0..grid.len()).map(|_| (amplitude * (dice.roll() - 0.5)) as f32).collect();
+        Heightfield::from_z(grid, z)
+    };
+    let rough = noise(1.0);
+    let fine = noise(0.02);
+    let scan = noise(1e-4);
+    let at = |f: &dyn Fn(DVec2) -> f64| {
+        let z = (0..grid.len())
+            .map(|n| f((grid.node(n % grid.nx, n / grid.nx) - lo) / size) as f32)
+            .collect();
+        Heightfield::from_z(grid, z)
+    };
+    let rolling = at(&|q| 0.8 * libm::sin(7.0 * q.x + 1.0) * libm::cos(5.0 * q.y - 2.0 * q.x));
+    let mut spike = Heightfield::flat(grid, -2.0);
+    spike.z_mut()[grid.nx * (grid.ny / 2) + grid.nx / 3] = 4.0;
+    let mut pit = Heightfield::flat(grid, 1.0);
+    pit.z_mut()[grid.nx * (grid.ny / 2) + grid.nx / 3] = -4.0;
+    vec![
+        ("white noise", rough),
+        ("fine noise", fine),
+        ("scan noise", scan),
+        ("rolling", rolling),
+        ("wall across x, 2 mm", at(&|q| if q.x > 0.5 { 2.0 } else { 0.0 })),
+        ("wall across y, 8 mm", at(&|q| if q.y > 0.4 { -8.0 } else { 0.0 })),
+        ("slanted wall, 4 mm", at(&|q| if q.x + 0.6 * q.y > 0.8 { 4.0 } else { q.x * 0.3 })),
+        ("diagonal wall, 2 mm", at(&|q| if q.x > q.y + 0.1 { 2.0 } else { 0.1 * q.y })),
+        ("round boss, 3 mm", at(&|q| if (q - 0.5).length() < 0.3 { 3.0 } else { 0.0 })),
+        ("level", at(&|_| 0.25)),
+        ("spike", spike),
+        ("pit", pit),
+    ]
+}
+
+/// Points on nodes, off nodes, on the rim, outside it and out of reach.
+fn points(surface: &Heightfield, radius_mm: f64, count: usize) -> Vec<DVec2> {
+    let grid = surface.grid();
+    let (b, mut dice) = (grid.bounds(), Dice(count as u64));
+    let mut points = vec![b.min, b.max, b.center(), b.min - DVec2::splat(radius_mm * 0.5)];
+    for _ in 0..count {
+        let span = b.grown(radius_mm * 1.1);
+        points.push(span.min + span.size() * DVec2::new(dice.roll(), dice.roll()));
+        points.push(b.min + b.size() * DVec2::new(dice.roll(), dice.roll()));
+        let (i, j) = (dice.roll() * grid.nx as f64, dice.roll() * grid.ny as f64);
+        points.push(grid.node(i as usize, j as usize));
+    }
+    points
+}
+
+/// Cutters from smaller than a cell to bigger than the field.
+fn cutters(pitch_mm: f64) -> Vec<Profile> {
+    [0.3, 0.9, 4.13, 15.0, 200.0]
+        .into_iter()
+        .flat_map(|nodes| {
+            let radius_mm = nodes * pitch_mm;
+            [Profile::Ball { radius_mm }, Profile::Flat { radius_mm }]
+        })
+        .collect()
+}
+
+#[test]
+fn drops_agree_with_the_plain_drop_cutter() {
+    for (name, surface) in surfaces(40, 0.1) {
+        for profile in cutters(0.1) {
+            let dropper = Dropper::new(&surface, profile);
+            let flat = Profile::Flat { radius_mm: profile.radius_mm() };
+            for p in points(&surface, profile.radius_mm(), 8) {
+                let (got, want) = (dropper.drop(p), oracle(&surface, &profile, p));
+                assert!(
+                    got == want || (got - want).abs() < 1e-6,
+                    "{name}, {profile:?} at {p}: {got}, plain {want}"
+                );
+                let (got, want) = (dropper.highest_under(p), oracle(&surface, &flat, p));
+                assert!(
+                    got == want || (got - want).abs() < 1e-6,
+                    "{name}, {profile:?} at {p}: highest {got}, plain {want}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn the_tip_field_is_the_exact_drop_at_every_node() {
+    for (name, surface) in surfaces(48, 0.1) {
+        for profile in cutters(0.1) {
+            let tip = tip_field(&surface, &profile);
+            let dropper = Dropper::new(&surface, profile);
+            let grid = surface.grid();
+            for j in 0..grid.ny {
+                for i in 0..grid.nx {
+                    let (got, want) = (f64::from(tip.at(i, j)), dropper.drop(grid.node(i, j)));
+                    assert!(
+                        (got - want).abs() < 1e-4,
+                        "{name}, {profile:?} at ({i}, {j}): {got}, exact {want}"
+                    );
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn one_and_two_threads_and_every_instruction_set_give_the_same_bits() {
+    let bits = |field: &[f32]| field.iter().map(|z| z.to_bits()).collect::<Vec<_>>();
+    for (name, surface) in surfaces(150, 0.1) {
+        for profile in [BALL_3, FLAT_3] {
+            let on = |threads: usize, path: Path| {
+                let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+                pool.install(|| bits(tip_field_on(path, &surface, &profile).z()))
+            };
+            let want = on(1, Path::Baseline);
+            for path in Path::available() {
+                for threads in [1, 2, 5] {
+                    assert!(on(threads, path) == want, "{name}, {profile:?}, {path:?}, {threads}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn the_dilation_of_the_nodes_is_its_definition() {
+    for (name, surface) in surfaces(70, 0.1) {
+        for profile in [Profile::Ball { radius_mm: 0.73 }, Profile::Flat { radius_mm: 0.73 }] {
+            for path in Path::available() {
+                let got = nodes_only(path, &surface, &profile);
+                let grid = surface.grid();
+                for n in 0..grid.len() {
+                    let p = grid.node(n % grid.nx, n / grid.nx);
+                    let mut want = f64::NEG_INFINITY;
+                    for m in 0..grid.len() {
+                        let q = grid.node(m % grid.nx, m / grid.nx);
+                        if let Some(rise) = profile.height_at(q.distance(p)) {
+                            want = want.max(f64::from(surface.z()[m]) - rise);
+                        }
+                    }
+                    let got = f64::from(got[n]);
+                    assert!((got - want).abs() < 1e-6, "{name} {profile:?} {path:?}: {got} {want}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn the_tip_rides_higher_on_a_slope_by_the_analytic_amount() {
+    for slope in [0.0, 0.01, 0.3, 1.0, 3.0, 20.0, 80.0] {
+        for turn in [0.0, 0.3, 0.785, 1.6, 2.8, 4.0] {
+            let g = DVec2::new(libm::cos(turn), libm::sin(turn)) * slope;
+            let plane = Heightfield::from_fn(grid(90, 90, 0.1), |q| g.dot(q));
+            for (profile, lift) in
+                [(BALL_3, 1.5 * ((1.0 + slope * slope).sqrt() - 1.0)), (FLAT_3, 1.5 * slope)]
+            {
+                let tip = tip_field(&plane, &profile);
+                let dropper = Dropper::new(&plane, profile);
+                // Heights of a few hundred mm are stored to 15 nm each; the field is that bumpy.
+                let slack = 1e-6 + 2e-7 * slope * 15.0;
+                let p = plane.grid().bounds().center() + DVec2::new(0.013, -0.041);
+                assert!((dropper.drop(p) - g.dot(p) - lift).abs() < slack, "{profile:?} {slope}");
+                let p = plane.grid().node(44, 47);
+                let got = f64::from(tip.at(44, 47));
+                assert!((got - g.dot(p) - lift).abs() < slack, "{profile:?} {slope} {turn}: {got}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_line_of_drops_is_the_drops() {
+    for (_, surface) in surfaces(60, 0.1) {
+        for profile in [BALL_3, FLAT_3] {
+            let dropper = Dropper::new(&surface, profile);
+            let (a, b) = (surface.grid().bounds().grown(3.0).min, surface.grid().bounds().max);
+            let mut line = vec![(-1.0, 0.0)];
+            dropper.drop_line(a, b, 0.1, &mut line);
+            let length = a.distance(b);
+            assert_eq!(line.len(), 2 + (length / 0.1).ceil() as usize);
+            assert_eq!(line[0], (-1.0, 0.0));
+            assert_eq!((line[1].0, line.last().unwrap().0), (0.0, length));
+            for &(s, z) in &line[1..] {
+                let want = dropper.drop(a + (b - a) * (s / length));
+                assert!(z == want || (z - want).abs() < 1e-9, "{z} {want}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_cutter_beside_the_field_touches_nothing() {
+    let surface = Heightfield::flat(grid(20, 20, 0.1), 1.0);
+    let dropper = Dropper::new(&surface, BALL_3);
+    let rim = surface.grid().bounds().min;
+    assert_eq!(dropper.drop(rim - DVec2::new(1.501, 0.0)), f64::NEG_INFINITY);
+    assert!((dropper.drop(rim - DVec2::new(1.5, 0.0)) - (-0.5)).abs() < 1e-6);
+    assert!((dropper.drop(rim - DVec2::new(0.9, 0.0)) - 0.7).abs() < 1e-12);
+    assert_eq!(dropper.highest_under(rim - DVec2::new(1.501, 0.0)), f64::NEG_INFINITY);
+    assert_eq!(dropper.highest_under(rim - DVec2::new(1.499, 0.0)), 1.0);
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(48))]
+
+    #[test]
+    fn drops_agree_with_the_plain_drop_cutter_anywhere(
+        z in proptest::collection::vec(-3.0f32..3.0, 11 * 9),
+        pitch_mm in 0.05f64..1.0, radius_mm in 0.02f64..3.0,
+        x in -0.5f64..1.5, y in -0.5f64..1.5, is_ball in any::<bool>(),
+    ) {
+        let surface = Heightfield::from_z(grid(11, 9, pitch_mm), z);
+        let profile =
+            if is_ball { Profile::Ball { radius_mm } } else { Profile::Flat { radius_mm } };
+        let b = surface.grid().bounds();
+        let p = b.min + b.size() * DVec2::new(x, y);
+        let (got, want) = (Dropper::new(&surface, profile).drop(p), oracle(&surface, &profile, p));
+        prop_assert!(got == want || (got - want).abs() < 1e-6, "{} {}", got, want);
+    }
+
+    #[test]
+    fn closing_never_goes_below_the_surface_and_is_idempotent_on_level_ground(
+        z in proptest::collection::vec(-1.0f32..1.0, 20 * 20), radius_mm in 0.1f64..1.5,
+        is_ball in any::<bool>(),
+    ) {
+        let surface = Heightfield::from_z(grid(20, 20, 0.1), z);
+        let profile =
+            if is_ball { Profile::Ball { radius_mm } } else { Profile::Flat { radius_mm } };
+        let left = closing(&tip_field(&surface, &profile), &profile);
+        for (got, want) in left.z().iter().zip(surface.z()) {
+            prop_assert!(*got >= *want - 1e-6);
+        }
+        let level = Heightfield::flat(*surface.grid(), 0.5);
+        prop_assert_eq!(closing(&tip_field(&level, &profile), &profile), level);
+    }
+}
