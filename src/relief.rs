@@ -1,6 +1,6 @@
 //! Layers' surfaces -> the relief heightfield: rasterise, combine, blend, background: the *target*.
 //!
-//! [`grid_of`] lays the grid over the stock; [`merge`] applies the layers bottom to top, then the
+//! [`grid_of`] lays the grid over the stock; [`merge()`] applies the layers bottom to top, then the
 //! background, and gives the target in work coordinates. A relief that does not fit into the stock is
 //! an error that says by how much, where, and what to change.
 

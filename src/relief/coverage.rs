@@ -50,7 +50,7 @@ impl Sums {
         let (low, high, sign) = if a.y < b.y { (a, b, -1.0) } else { (b, a, 1.0) };
         let slope = (high.x - low.x) / (high.y - low.y);
         let (first, end) = (low.y.max(0.0), high.y.min(self.ny as f64));
-        if !(first < end) {
+        if first >= end || slope.is_nan() {
             return;
         }
         let x_at = |y: f64| {

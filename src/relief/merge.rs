@@ -30,6 +30,8 @@ const BAND: usize = 32;
 const COVERAGE_ROUNDING: f64 = 1e-9;
 /// Heights that leave the stock by less than this are rounding of `f32` and put level with it, mm.
 const LEVEL_MM: f64 = 1e-5;
+/// Share of a layer's area that may be thinner than a cell (the tips of its figures) without a note.
+const THIN_SHARE: f64 = 0.01;
 /// In a node's mark: some figure covers part of its cell. The rest: 1 + the last layer to change it.
 const COVERED: u16 = 1 << 15;
 
@@ -70,6 +72,7 @@ pub fn merge(
         all.join(find);
     }
     all.verdict(job, grid)?;
+    notes.extend(thin_notes(job, outlines, &all.thin, grid));
     notes.extend(all.in_frame.iter().map(|&layer| {
         format!("layer '{}' reaches into the frame; it is cut off there", job.layers[layer].name)
     }));
@@ -86,7 +89,9 @@ fn check(job: &Job, outlines: &Outlines, surfaces: &[Vec<Surface>]) -> Result<()
         }
     }
     for layer in &job.layers {
-        if layer.combine == Combine::Multiply && !(layer.height_mm > 0.0) {
+        if layer.combine == Combine::Multiply
+            && (layer.height_mm <= 0.0 || layer.height_mm.is_nan())
+        {
             let (layer, height_mm) = (layer.name.clone(), layer.height_mm);
             return Err(ReliefError::MultiplyByNothing { layer, height_mm });
         }
@@ -216,6 +221,8 @@ struct Band<'a> {
     depth: Vec<f32>,
     /// Largest distance inside an outline of the layers below; empty when no layer is blended.
     below: Vec<f32>,
+    /// For each layer: covered cells in parts of figures so thin that no node lies inside nearby.
+    thin: Vec<f64>,
 }
 
 impl<'a> Band<'a> {
@@ -239,6 +246,7 @@ impl<'a> Band<'a> {
             cover: field(true, 0.0),
             depth: field(measured, 0.0),
             below: field(blended, 0.0),
+            thin: vec![0.0; layers.len()],
         }
     }
 
@@ -271,7 +279,7 @@ impl<'a> Band<'a> {
             }
         }
         for body in &layer.bodies {
-            self.gather(body);
+            self.gather(index, body);
         }
         for j in j0..j1 {
             for k in self.at(i0, j)..self.at(i1, j) {
@@ -281,7 +289,7 @@ impl<'a> Band<'a> {
     }
 
     /// Adds one figure to the present layer.
-    fn gather(&mut self, body: &Body) {
+    fn gather(&mut self, index: usize, body: &Body) {
         let window = self.rows_of(&body.patch.window());
         for j in window.j0..window.j0 + window.ny {
             let from = (j - body.patch.j0) * window.nx;
@@ -299,10 +307,16 @@ impl<'a> Band<'a> {
         let cover = coverage(body.rings(), &self.grid, &window);
         for (row, cover) in cover.chunks_exact(window.nx).enumerate() {
             let at = self.at(window.i0, window.j0 + row);
-            for (out, &a) in self.cover[at..at + window.nx].iter_mut().zip(cover) {
+            for (i, &a) in cover.iter().enumerate() {
                 if a > COVERAGE_ROUNDING {
+                    let out = &mut self.cover[at + i];
                     let sum = f64::from(*out) + a;
                     *out = if sum > 1.0 - COVERAGE_ROUNDING { 1.0 } else { sum as f32 };
+                    if a < 1.0 - COVERAGE_ROUNDING
+                        && lonely(&body.patch, window.i0 + i, window.j0 + row)
+                    {
+                        self.thin[index] += a;
+                    }
                 }
             }
         }
@@ -355,6 +369,35 @@ impl<'a> Band<'a> {
     }
 }
 
+/// True when the patch has no height at node (i, j) nor at its eight neighbours.
+fn lonely(patch: &Patch, i: usize, j: usize) -> bool {
+    let bare = |i, j| patch.at(i, j).is_nan();
+    let row = |j: usize| (i.saturating_sub(1)..=i + 1).all(|i| bare(i, j));
+    bare(i, j) && (j.saturating_sub(1)..=j + 1).all(row)
+}
+
+/// Tells of layers with more than a trace of parts thinner than a cell.
+fn thin_notes(job: &Job, outlines: &Outlines, thin: &[f64], grid: &Grid) -> Vec<String> {
+    let cell = grid.pitch_mm * grid.pitch_mm;
+    let mut notes = Vec::new();
+    for ((spec, outline), cells) in job.layers.iter().zip(&outlines.layers).zip(thin) {
+        let regions = outline.figures.iter().flat_map(|f| &f.regions);
+        let area: f64 = regions.map(crate::outline::Region::area).sum();
+        let share = cells * cell / area;
+        if share > THIN_SHARE {
+            notes.push(format!(
+                "layer '{}': {:.0} % of its area ({:.2} mm2) is thinner than a cell of the grid and stays at the \
+                 height of its outline; a smaller relief.pitch_mm (now {}) shows more of it",
+                spec.name,
+                100.0 * share,
+                cells * cell,
+                grid.pitch_mm
+            ));
+        }
+    }
+    notes
+}
+
 /// The background and the stock.
 struct Ground {
     depth_mm: f64,
@@ -385,7 +428,7 @@ impl Ground {
     /// finds the places that lie outside of the stock.
     fn finish(&self, band: &mut Band) -> Find {
         let left = self.left(band);
-        let mut find = Find::default();
+        let mut find = Find { thin: std::mem::take(&mut band.thin), ..Find::default() };
         let Window { j0, ny, nx, .. } = band.window;
         for j in j0..j0 + ny {
             for i in 0..nx {
@@ -444,6 +487,8 @@ struct Find {
     lost: Option<Place>,
     /// Layers that the frame cuts off.
     in_frame: BTreeSet<usize>,
+    /// For each layer: cells covered by parts thinner than a cell.
+    thin: Vec<f64>,
 }
 
 impl Find {
@@ -462,6 +507,8 @@ impl Find {
         worse(&mut self.low, next.low);
         self.lost = self.lost.or(next.lost);
         self.in_frame.extend(next.in_frame);
+        self.thin.resize(next.thin.len(), 0.0);
+        self.thin.iter_mut().zip(next.thin).for_each(|(sum, next)| *sum += next);
     }
 
     fn verdict(&self, job: &Job, grid: &Grid) -> Result<(), ReliefError> {

@@ -385,6 +385,32 @@ fn a_mesh_joins_like_a_field() {
 }
 
 #[test]
+fn hairlines_on_a_broad_figure_are_told() {
+    // A block of 16 mm2 with a tail of 10 x 0.1 mm between two rows of nodes: 1 of 17 mm2.
+    let ring = |tail: f64| -> Ring {
+        [
+            (2.0, 2.0),
+            (6.0, 2.0),
+            (6.0, 4.05),
+            (16.0, 4.05),
+            (16.0, 4.05 + tail),
+            (6.0, 4.05 + tail),
+            (6.0, 6.0),
+            (2.0, 6.0),
+        ]
+        .map(DVec2::from)
+        .to_vec()
+    };
+    let job = job(vec![LayerSpec { base_mm: 0.0, ..flat("tailed", 2.0, Combine::Max) }]);
+    let notes = relief(&job, &outlines(vec![vec![ring(0.1)]])).unwrap().notes;
+    assert_eq!(notes.len(), 1);
+    for part in ["'tailed'", "6 %", "thinner than a cell"] {
+        assert!(notes[0].contains(part), "{}", notes[0]);
+    }
+    assert!(relief(&job, &outlines(vec![vec![ring(0.9)]])).unwrap().notes.is_empty());
+}
+
+#[test]
 fn a_grid_beyond_all_memory_is_refused_with_a_cure() {
     let mut job = job(vec![flat("a", 1.0, Combine::Max)]);
     (job.stock.width_mm, job.stock.height_mm) = (1e6, 1e6);

@@ -23,7 +23,7 @@ pub fn inscribed_radius(region: &Region, segments: &Segments, tolerance_mm: f64)
     let mut search = Search { region, segments, lists, best: 0.0, tolerance_mm, boxes: 0 };
     let root = Area { center: bounds.center(), half: bounds.size() * 0.5 };
     if let Some(area) = search.look(root, 0..segments.len(), None) {
-        search.divide(area);
+        search.divide(&area);
     }
     search.best
 }
@@ -101,7 +101,7 @@ impl Search<'_> {
     }
 
     /// Looks at both halves and goes on with the more promising one.
-    fn divide(&mut self, whole: Promising) {
+    fn divide(&mut self, whole: &Promising) {
         let start = self.lists.kept.len();
         let [a, b] = whole
             .area
@@ -111,7 +111,7 @@ impl Search<'_> {
         let order = if rank(&a) >= rank(&b) { [a, b] } else { [b, a] };
         for half in order.into_iter().flatten() {
             if half.upper > self.best + self.tolerance_mm {
-                self.divide(half);
+                self.divide(&half);
             }
         }
         self.lists.kept.truncate(start);
