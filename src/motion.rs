@@ -79,7 +79,7 @@ impl Planner {
     pub fn push(&mut self, mv: &Move) {
         let d = mv.to - mv.from;
         let length = d.length();
-        if !(length > MIN_BLOCK_MM) {
+        if length.is_nan() || length <= MIN_BLOCK_MM {
             return;
         }
         let unit = d / length;

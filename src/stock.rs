@@ -7,10 +7,10 @@
 mod sweep;
 
 use crate::cutter::Profile;
-use crate::geom::{DVec2, Grid, Heightfield, Move};
+use crate::geom::{DVec2, DVec3, Grid, Heightfield, Move};
 use crate::job::Stock;
 use rayon::prelude::*;
-use sweep::{SPAN_SLACK_MM, Sweep, Tip};
+use sweep::{Joint, Left, SPAN_SLACK_MM, Span, Sweep, Tip};
 
 /// What a move met.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -22,7 +22,9 @@ pub struct Contact {
 }
 
 impl Contact {
-    fn worst(self, other: Self) -> Self {
+    /// The larger of both, figure by figure.
+    #[must_use]
+    pub fn worst(self, other: Self) -> Self {
         Self {
             deepest_mm: self.deepest_mm.max(other.deepest_mm),
             engaged_mm: self.engaged_mm.max(other.engaged_mm),
@@ -49,6 +51,9 @@ pub struct Block {
 
 /// Rows of nodes that one task carves.
 const BAND_ROWS: usize = 64;
+
+/// Widest wedge at a joint that counts as thin, nodes.
+const THIN_NODES: f64 = 2.0;
 
 /// Less than this removed at a node does not count as engagement, mm (rounding of the stored heights).
 const ENGAGED_FROM_MM: f64 = 1e-3;
@@ -99,31 +104,36 @@ impl Block {
     ) -> Vec<Contact> {
         let mut contacts = vec![Contact::default(); moves.len()];
         let tip = Tip::of(profile);
-        let joint = |k: usize| {
-            k > 0
-                && k < moves.len()
-                && !alone(k - 1)
-                && !alone(k)
-                && sweep::joined(&moves[k - 1], &moves[k])
-        };
-        let grid = *self.field.grid();
+        // A wedge up to a few nodes wide costs less as part of a strip than as a stamp of its own.
+        let thin_mm = THIN_NODES * self.field.grid().pitch_mm;
+        let joints: Vec<Joint> = (0..moves.len() + 1)
+            .into_par_iter()
+            .with_min_len(1024)
+            .map(|k| match (k.checked_sub(1), moves.get(k)) {
+                (Some(i), Some(next)) if !alone(i) && !alone(k) => {
+                    Joint::of(&moves[i], next, tip, thin_mm)
+                }
+                _ => Joint::None,
+            })
+            .collect();
+        let lattice = Lattice::new(*self.field.grid());
         let top_mm = self.top_mm;
         let bins = self.bins(tip.radius, moves);
         let parts: Vec<Vec<(u32, Contact)>> = self
             .field
             .z_mut()
-            .par_chunks_mut(grid.nx * BAND_ROWS)
+            .par_chunks_mut(lattice.grid.nx * BAND_ROWS)
             .zip(bins)
             .enumerate()
             .map(|(b, (z, bin))| {
-                let mut band = Band { grid, row0: b * BAND_ROWS, z };
+                let mut band = Band { lattice, row0: b * BAND_ROWS, z };
                 let mut met = Vec::new();
                 for k in bin {
                     let i = k as usize;
                     let mut contact = Contact::default();
-                    let ends = [joint(i), joint(i + 1)];
+                    let ends = [joints[i], joints[i + 1]];
                     band.carve(&Sweep::of(&moves[i], tip, ends), &mut contact);
-                    if ends[1]
+                    if ends[1] == Joint::Wedge
                         && moves[i].to.z < top_mm
                         && let Some(wedge) = Sweep::wedge(&moves[i], &moves[i + 1], tip)
                     {
@@ -145,14 +155,15 @@ impl Block {
 
     /// The moves that can touch each band of rows, in order. Moves above the wood are left out.
     fn bins(&self, radius_mm: f64, moves: &[Move]) -> Vec<Vec<u32>> {
-        let grid = self.field.grid();
-        let mut bins = vec![Vec::new(); grid.ny.div_ceil(BAND_ROWS)];
+        let lattice = Lattice::new(*self.field.grid());
+        let ny = lattice.grid.ny;
+        let mut bins = vec![Vec::new(); ny.div_ceil(BAND_ROWS)];
         for (k, m) in moves.iter().enumerate() {
             if m.from.z.min(m.to.z) >= self.top_mm {
                 continue;
             }
             let (lo, hi) = (m.from.y.min(m.to.y) - radius_mm, m.from.y.max(m.to.y) + radius_mm);
-            if let Some((j0, j1)) = rows(grid, lo, hi, 0, grid.ny) {
+            if let Some((j0, j1)) = lattice.rows(lo, hi, 0, ny) {
                 for bin in &mut bins[j0 / BAND_ROWS..=j1 / BAND_ROWS] {
                     bin.push(k as u32);
                 }
@@ -164,16 +175,17 @@ impl Block {
     /// Height of the highest wood under a disc at `p`, mm: never too low, at most by what lies within a cell's
     /// diagonal outside the disc too high. Minus infinity where there is no wood.
     pub fn highest_under(&self, radius_mm: f64, p: DVec2) -> f64 {
-        let grid = self.field.grid();
+        let lattice = Lattice::new(*self.field.grid());
+        let grid = lattice.grid;
         let r = radius_mm + grid.pitch_mm * std::f64::consts::SQRT_2;
         let mut highest = f32::NEG_INFINITY;
-        let Some((j0, j1)) = rows(grid, p.y - r, p.y + r, 0, grid.ny) else {
+        let Some((j0, j1)) = lattice.rows(p.y - r, p.y + r, 0, grid.ny) else {
             return f64::NEG_INFINITY;
         };
         for j in j0..=j1 {
             let dy = grid.node(0, j).y - p.y;
             let w = (r * r - dy * dy).max(0.0).sqrt();
-            if let Some((i0, i1)) = columns(grid, p.x - w, p.x + w) {
+            if let Some((i0, i1)) = lattice.columns(p.x - w, p.x + w) {
                 for &z in &self.field.row(j)[i0..=i1] {
                     highest = if z > highest { z } else { highest };
                 }
@@ -189,17 +201,17 @@ impl Block {
         if lowest >= self.top_mm {
             return None;
         }
-        let grid = self.field.grid();
-        let sweep = Sweep::of(mv, Tip::of(&Profile::Flat { radius_mm }), [false, false]);
+        let lattice = Lattice::new(*self.field.grid());
+        let sweep = Sweep::of(mv, Tip::of(&Profile::Flat { radius_mm }), [Joint::None; 2]);
         let (lo, hi) = sweep.y_range();
-        let (j0, j1) = rows(grid, lo, hi, 0, grid.ny)?;
+        let (j0, j1) = lattice.rows(lo, hi, 0, lattice.grid.ny)?;
         let mut worst: Option<Touch> = None;
         for j in j0..=j1 {
-            for_row(grid, &sweep, j, |i, d| {
-                let Some(left) = sweep.left(d) else { return };
-                let depth_mm = f64::from(self.field.at(i, j)) - (left.z + above_tip_mm);
+            let row = self.field.row(j);
+            for_nodes(&lattice, &sweep, j, |i, left| {
+                let depth_mm = f64::from(row[i]) - (left.z + above_tip_mm);
                 if depth_mm > worst.map_or(0.0, |w| w.depth_mm) {
-                    worst = Some(Touch { at: grid.node(i, j), depth_mm });
+                    worst = Some(Touch { at: lattice.grid.node(i, j), depth_mm });
                 }
             });
         }
@@ -209,23 +221,22 @@ impl Block {
 
 /// Some rows of the wood.
 struct Band<'a> {
-    grid: Grid,
+    lattice: Lattice,
     row0: usize,
     z: &'a mut [f32],
 }
 
 impl Band<'_> {
     fn carve(&mut self, sweep: &Sweep, contact: &mut Contact) {
-        let nx = self.grid.nx;
+        let nx = self.lattice.grid.nx;
         let rows_here = self.z.len() / nx;
         let (lo, hi) = sweep.y_range();
-        let Some((j0, j1)) = rows(&self.grid, lo, hi, self.row0, self.row0 + rows_here) else {
+        let Some((j0, j1)) = self.lattice.rows(lo, hi, self.row0, self.row0 + rows_here) else {
             return;
         };
         for j in j0..=j1 {
             let row = &mut self.z[(j - self.row0) * nx..][..nx];
-            for_row(&self.grid, sweep, j, |i, d| {
-                let Some(left) = sweep.left(d) else { return };
+            for_nodes(&self.lattice, sweep, j, |i, left| {
                 let old = row[i];
                 let new = left.z as f32;
                 if new < old {
@@ -241,55 +252,81 @@ impl Band<'_> {
     }
 }
 
-/// Calls `f` with the column and the offset from the sweep's anchor of every node of row `j` worth a look.
+/// Calls `f` with the column of every node of row `j` that a sweep comes to, and what it leaves there.
 #[inline]
-fn for_row(grid: &Grid, sweep: &Sweep, j: usize, mut f: impl FnMut(usize, DVec2)) {
-    let anchor = sweep.anchor();
-    let dy = grid.origin.y + j as f64 * grid.pitch_mm - anchor.y;
-    let x0 = grid.origin.x - anchor.x;
-    for span in sweep.spans(dy) {
-        if span.lo > span.hi + 2.0 * SPAN_SLACK_MM {
-            continue;
-        }
-        let lo = anchor.x + span.lo - SPAN_SLACK_MM;
-        let hi = anchor.x + span.hi + SPAN_SLACK_MM;
-        if let Some((i0, i1)) = columns(grid, lo, hi) {
+fn for_nodes(lattice: &Lattice, sweep: &Sweep, j: usize, f: impl FnMut(usize, Left)) {
+    match sweep {
+        Sweep::Stamp(s) => lattice.visit(j, s.anchor(), |dy| s.spans(dy), |d| s.left(d), f),
+        Sweep::Along(a) => lattice.visit(j, a.anchor(), |dy| a.spans(dy), |d| a.left(d), f),
+    }
+}
+
+/// A grid made ready for finding nodes.
+#[derive(Debug, Clone, Copy)]
+struct Lattice {
+    grid: Grid,
+    per_mm: f64,
+}
+
+impl Lattice {
+    fn new(grid: Grid) -> Self {
+        Self { grid, per_mm: 1.0 / grid.pitch_mm }
+    }
+
+    /// First and last row in `from..to` with y in `lo..=hi`.
+    fn rows(&self, lo: f64, hi: f64, from: usize, to: usize) -> Option<(usize, usize)> {
+        let y0 = self.grid.origin.y;
+        index_range((lo - y0) * self.per_mm, (hi - y0) * self.per_mm, from, to)
+    }
+
+    /// First and last column with x in `lo..=hi`.
+    #[inline]
+    fn columns(&self, lo: f64, hi: f64) -> Option<(usize, usize)> {
+        let x0 = self.grid.origin.x;
+        index_range((lo - x0) * self.per_mm, (hi - x0) * self.per_mm, 0, self.grid.nx)
+    }
+
+    /// Calls `f` with the column of every node of row `j` in `spans` (by the row's height above the anchor), and what is
+    /// left there (by the offset from the anchor).
+    #[inline]
+    fn visit<const N: usize>(
+        &self,
+        j: usize,
+        anchor: DVec3,
+        spans: impl Fn(f64) -> [Span; N],
+        left: impl Fn(DVec2) -> Option<Left>,
+        mut f: impl FnMut(usize, Left),
+    ) {
+        let (origin, pitch) = (self.grid.origin, self.grid.pitch_mm);
+        let dy = origin.y + j as f64 * pitch - anchor.y;
+        let x0 = origin.x - anchor.x;
+        for span in spans(dy) {
+            let lo = anchor.x + span.lo - SPAN_SLACK_MM;
+            let hi = anchor.x + span.hi + SPAN_SLACK_MM;
+            if hi < lo {
+                continue;
+            }
+            let Some((i0, i1)) = self.columns(lo, hi) else { continue };
             for i in i0..=i1 {
-                f(i, DVec2::new(x0 + i as f64 * grid.pitch_mm, dy));
+                if let Some(left) = left(DVec2::new(x0 + i as f64 * pitch, dy)) {
+                    f(i, left);
+                }
             }
         }
     }
 }
 
-/// First and last row in `from..to` with y in `lo..=hi`.
-fn rows(grid: &Grid, lo: f64, hi: f64, from: usize, to: usize) -> Option<(usize, usize)> {
-    index_range(
-        (lo - grid.origin.y) / grid.pitch_mm,
-        (hi - grid.origin.y) / grid.pitch_mm,
-        from,
-        to,
-    )
-}
-
-/// First and last column with x in `lo..=hi`.
-fn columns(grid: &Grid, lo: f64, hi: f64) -> Option<(usize, usize)> {
-    index_range(
-        (lo - grid.origin.x) / grid.pitch_mm,
-        (hi - grid.origin.x) / grid.pitch_mm,
-        0,
-        grid.nx,
-    )
-}
-
 /// The whole numbers in `lo..=hi` that are in `from..to`, as first and last.
 #[inline]
 fn index_range(lo: f64, hi: f64, from: usize, to: usize) -> Option<(usize, usize)> {
-    // A float cast saturates, so that infinities end at the border.
-    let first = (lo.max(from as f64).ceil() as usize).max(from);
+    // Casts saturate and drop the fraction: a grid has far fewer than 2^31 rows and columns. Rounding up by
+    // hand, for ceil() is a call on plain x86-64.
+    let below = lo.max(from as f64) as i32;
+    let first = below as usize + usize::from(f64::from(below) < lo);
     if hi < first as f64 || first >= to {
         return None;
     }
-    Some((first, (hi as usize).min(to - 1)))
+    Some((first, (hi as i32 as usize).min(to - 1)))
 }
 
 #[cfg(test)]

@@ -11,7 +11,7 @@ mod words;
 use crate::geom::arc::{Plane, Turn, chords};
 use crate::geom::{DVec2, DVec3, Move, MoveKind};
 use crate::job::Machine;
-use words::{Line, Motion};
+use words::{Distance, Line, Motion};
 
 /// A program as read.
 #[derive(Debug, Clone)]
@@ -127,6 +127,9 @@ pub enum Fault {
 /// Most moves that a program may have, arcs counted by their chords.
 pub const MAX_MOVES: usize = 20_000_000;
 
+/// Length of a line of a relief, to guess the number of moves, characters.
+const TYPICAL_LINE: usize = 16;
+
 /// GRBL's limits for the ends of arcs by centre, mm and fraction of the radius.
 const ARC_OFF_ALWAYS_MM: f64 = 0.5;
 const ARC_OFF_MM: f64 = 0.005;
@@ -139,6 +142,7 @@ const ARC_OFF_FRACTION: f64 = 0.001;
 pub fn read(text: &str, machine: &Machine, start: DVec3) -> Result<Program, ReadError> {
     let mut reader = Reader::new(machine, start);
     let mut rest = text.as_bytes();
+    reader.program.moves.reserve((rest.len() / TYPICAL_LINE).min(MAX_MOVES));
     while !rest.is_empty() {
         reader.number += 1;
         reader.text = rest;
@@ -169,7 +173,7 @@ struct Reader<'a> {
     motion: Motion,
     plane: Plane,
     mm_per_unit: f64,
-    relative: bool,
+    distance: Distance,
     feed_mm_per_min: Option<f64>,
     rpm: f64,
     spindle: bool,
@@ -189,7 +193,7 @@ impl Reader<'_> {
             motion: Motion::Rapid,
             plane: Plane::Xy,
             mm_per_unit: 1.0,
-            relative: false,
+            distance: Distance::Absolute,
             feed_mm_per_min: None,
             rpm: 0.0,
             spindle: false,
@@ -236,7 +240,7 @@ impl Reader<'_> {
         }
         self.obey_spindle()?;
         if let Some(t) = self.line.take(b'T')
-            && (t < 0.0 || t > 255.0 || t.fract() != 0.0)
+            && (!(0.0..=255.0).contains(&t) || t.fract() != 0.0)
         {
             return Err(self.error_at(b'T', Fault::BadNumber));
         }
@@ -251,8 +255,8 @@ impl Reader<'_> {
         if let Some(plane) = self.line.plane {
             self.plane = plane;
         }
-        if let Some(relative) = self.line.relative {
-            self.relative = relative;
+        if let Some(distance) = self.line.distance {
+            self.distance = distance;
         }
         self.obey_motion()?;
         if let Some(letter) = self.line.unused() {
@@ -319,7 +323,8 @@ impl Reader<'_> {
         let mut to = old;
         for ((to, old), word) in to.iter_mut().zip(old).zip(axes) {
             if let Some(v) = word {
-                *to = v * self.mm_per_unit + if self.relative { old } else { 0.0 };
+                let from = if self.distance == Distance::Incremental { old } else { 0.0 };
+                *to = from + v * self.mm_per_unit;
             }
         }
         let to = DVec3::from_array(to);
@@ -350,7 +355,7 @@ impl Reader<'_> {
         if !self.z_known && (x.is_some() || y.is_some()) {
             self.program.blind_line.get_or_insert(self.number);
         }
-        self.z_known |= z.is_some() && !self.relative;
+        self.z_known |= z.is_some() && self.distance == Distance::Absolute;
     }
 
     fn push(&mut self, to: DVec3, kind: MoveKind) -> Result<(), ReadError> {

@@ -7,9 +7,7 @@ use super::{Bounds, DVec2};
 #[non_exhaustive]
 pub enum GridError {
     /// A size or the pitch is not a positive, finite number.
-    #[error(
-        "a grid of {width_mm} x {height_mm} mm at pitch {pitch_mm} mm: sizes and pitch must be positive numbers"
-    )]
+    #[error("a grid of {width_mm} x {height_mm} mm at pitch {pitch_mm} mm: sizes and pitch must be positive numbers")]
     BadSize {
         /// Width asked for, mm.
         width_mm: f64,

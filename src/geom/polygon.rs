@@ -97,7 +97,10 @@ mod tests {
         let right: Ring = left.iter().map(|p| *p + DVec2::new(1.0, 0.0)).collect();
         let above: Ring = left.iter().map(|p| *p + DVec2::new(0.0, 1.0)).collect();
         for p in [DVec2::new(1.0, 0.5), DVec2::new(1.0, 0.25)] {
-            let n = [&left, &right].iter().filter(|r| contains_even_odd([r.as_slice()], p)).count();
+            let n = [&left, &right]
+                .iter()
+                .filter(|r| contains_even_odd([r.as_slice()], p))
+                .count();
             assert_eq!(n, 1, "{p}");
         }
         let p = DVec2::new(0.5, 1.0);

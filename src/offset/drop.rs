@@ -15,6 +15,9 @@ use crate::geom::{DVec2, Grid, Heightfield};
 /// Leaves whose facets wait until all vertices are known.
 const WAITING: usize = 48;
 
+/// Fans of one level along x and y under which a search starts.
+const FEW: usize = 3;
+
 /// A ball is looked at cell by cell where its half chord is below this part of its radius.
 const STEEP_CHORD: f64 = 0.35;
 
@@ -92,8 +95,11 @@ impl<'a> Dropper<'a> {
             waiting: [(0.0, (0, 0)); WAITING],
             waiting_len: 0,
         };
-        if let Some(near) = near {
-            search.vertices(near);
+        match near {
+            Some(near) => {
+                search.vertices(near);
+            }
+            None => search.guess(),
         }
         search.start();
         search.finish();
@@ -106,75 +112,78 @@ impl Search<'_> {
         self.surface.grid()
     }
 
-    /// Finds the blocks under the cutter and visits them.
+    /// Looks at the leaf where the cutter would touch if the surface went on as it does under the axis.
+    fn guess(&mut self) {
+        let (grid, level) = (*self.grid(), &self.levels[0]);
+        let last = DVec2::new((grid.nx - 2) as f64, (grid.ny - 2) as f64);
+        let mut at = self.p;
+        for _ in 0..2 {
+            let cell = grid.to_grid(at).max(DVec2::ZERO).min(last);
+            let (x, y) = (cell.x as usize / FAN, cell.y as usize / FAN);
+            self.vertices((x, y));
+            let fan = &level.fans[y / FAN * level.nx + x / FAN];
+            let slope = fan.slope(y % FAN * FAN + x % FAN);
+            let one = if matches!(self.profile, Profile::Ball { .. }) { 1.0 } else { 1e-9 };
+            at = self.p + slope * (self.radius_mm / (one + slope.length_squared()).sqrt());
+        }
+    }
+
+    /// Finds the fans under the cutter and visits them.
     fn start(&mut self) {
         let grid = self.grid();
-        let cells = [(grid.nx - 1) as f64, (grid.ny - 1) as f64];
         let reach = DVec2::splat(self.radius_mm + TOUCH_MM);
         let (lo, hi) = (grid.to_grid(self.p - reach), grid.to_grid(self.p + reach));
-        // A slack cell on either side: the blocks' own distances decide.
-        let span = |lo: f64, hi: f64, cells: f64| {
-            let overlaps = hi >= -1.0 && lo <= cells + 1.0;
-            overlaps.then(|| ((lo - 1e-6).max(0.0) as usize, (hi + 1e-6).min(cells - 1.0).max(0.0)))
+        // Some slack: the blocks' own distances decide.
+        let span = |lo: f64, hi: f64, nodes: usize| {
+            let last = (nodes - 2) as f64;
+            let overlaps = hi >= -1.0 && lo <= last + 2.0;
+            let cell = |at: f64| at.max(0.0).min(last) as usize;
+            overlaps.then(|| (cell(lo - 1e-6), cell(hi + 1e-6)))
         };
-        let (Some((i0, i1)), Some((j0, j1))) =
-            (span(lo.x, hi.x, cells[0]), span(lo.y, hi.y, cells[1]))
-        else {
+        let (Some(x), Some(y)) = (span(lo.x, hi.x, grid.nx), span(lo.y, hi.y, grid.ny)) else {
             return;
         };
-        let (i1, j1) = (i1 as usize, j1 as usize);
-        // The finest level on which the cutter meets no more blocks than one block has parts.
-        for (depth, level) in self.levels.iter().enumerate() {
-            let (x0, y0) =
-                ((i0 / level.cells).min(level.nx - 1), (j0 / level.cells).min(level.ny - 1));
-            let (x1, y1) = (i1 / level.cells, j1 / level.cells);
-            if (x1.max(x0) - x0 < FAN && y1.max(y0) - y0 < FAN) || depth + 1 == self.levels.len() {
-                self.visit(depth, (x0, y0), (x1.max(x0) + 1, y1.max(y0) + 1));
+        // The finest level on which few fans lie under the cutter.
+        let levels = self.levels;
+        let few = |level: &Level| {
+            let cells = level.cells * FAN;
+            x.1 / cells - x.0 / cells < FEW && y.1 / cells - y.0 / cells < FEW
+        };
+        let depth = levels.iter().position(few).unwrap_or(levels.len() - 1);
+        let cells = levels[depth].cells * FAN;
+        for fy in y.0 / cells..=y.1 / cells {
+            for fx in x.0 / cells..=x.1 / cells {
+                self.visit(depth, (fx, fy));
+            }
+        }
+    }
+
+    /// Visits the blocks of a fan, the most promising first.
+    fn visit(&mut self, depth: usize, (fx, fy): Block) {
+        let grid = self.grid();
+        let level = &self.levels[depth];
+        let side_mm = level.cells as f64 * grid.pitch_mm;
+        let corner =
+            DVec2::new((fx * FAN) as f64, (fy * FAN) as f64) * side_mm + (grid.origin - self.p);
+        let mut bounds = level.fans[fy * level.nx + fx].bounds(&self.profile, corner, side_mm);
+        loop {
+            let (mut bound, mut lane) = (f32::NEG_INFINITY, 0);
+            for (n, &b) in bounds.iter().enumerate() {
+                if b > bound {
+                    (bound, lane) = (b, n);
+                }
+            }
+            if f64::from(bound) <= self.best {
                 return;
             }
-        }
-    }
-
-    /// Visits the blocks `from..to` of a level, the most promising first.
-    fn visit(&mut self, depth: usize, from: Block, to: Block) {
-        let levels = self.levels;
-        let level = &levels[depth];
-        let mut bounds = [(f64::NEG_INFINITY, (0, 0)); FAN * FAN];
-        let mut count = 0;
-        for y in from.1..to.1 {
-            for x in from.0..to.0 {
-                let bound = self.bound(level, (x, y));
-                if bound > self.best {
-                    bounds[count] = (bound, (x, y));
-                    count += 1;
-                }
-            }
-        }
-        let bounds = &mut bounds[..count];
-        loop {
-            let mut top = (self.best, None);
-            for (n, &(bound, _)) in bounds.iter().enumerate() {
-                if bound > top.0 {
-                    top = (bound, Some(n));
-                }
-            }
-            let Some(n) = top.1 else { return };
-            let (bound, (x, y)) = bounds[n];
-            bounds[n].0 = f64::NEG_INFINITY;
+            bounds[lane] = f32::NEG_INFINITY;
+            let block = (fx * FAN + lane % FAN, fy * FAN + lane / FAN);
             if depth == 0 {
-                self.leaf((x, y), bound);
+                self.leaf(block, f64::from(bound));
             } else {
-                let fine = &levels[depth - 1];
-                let to = ((x * FAN + FAN).min(fine.nx), (y * FAN + FAN).min(fine.ny));
-                self.visit(depth - 1, (x * FAN, y * FAN), to);
+                self.visit(depth - 1, block);
             }
         }
-    }
-
-    /// The tip can be no higher than this over contacts in a block.
-    fn bound(&self, level: &Level, (x, y): Block) -> f64 {
-        let near = self.nearest((x * level.cells, y * level.cells), level.cells);
-        self.tip_below(f64::from(level.top[y * level.nx + x]), near)
     }
 
     /// Square of the distance from the axis to the nearest point of a square of cells.

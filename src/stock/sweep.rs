@@ -86,44 +86,65 @@ struct Behind {
     u: DVec2,
     mp: f64,
     r: f64,
+    /// 1/u.x, 1/u.y (unused where infinite), u.x^2 + m'^2 u.y^2 and 1/that.
+    inv_u: DVec2,
+    a: f64,
+    inv_a: f64,
 }
 
+/// A component of a direction smaller than this is taken for zero.
+const PARALLEL: f64 = 1e-12;
+
 impl Behind {
+    fn new(u: DVec2, mp: f64, r: f64) -> Self {
+        let a = u.x * u.x + mp * mp * u.y * u.y;
+        Self { u, mp, r, inv_u: u.recip(), a, inv_a: 1.0 / a }
+    }
+
     /// Its part of the row `dy` above the point where s = q = 0.
+    #[inline]
     fn row(&self, c: f64, dy: f64) -> Span {
-        let Self { u, mp, r } = *self;
+        let Self { u, mp, r, .. } = *self;
         let across = u.x * dy;
-        let strip = if u.y.abs() > 1e-12 {
-            let (a, b) = ((across - r) / u.y, (across + r) / u.y);
-            Span::new(a.min(b), a.max(b))
-        } else if across.abs() <= r {
-            Span::ALL
-        } else {
-            return Span::EMPTY;
-        };
+        if u.y.abs() < PARALLEL {
+            let w2 = r * r - across * across;
+            if w2 < 0.0 {
+                return Span::EMPTY;
+            }
+            let end = c + mp * w2.sqrt();
+            return if u.x > 0.0 {
+                Span::new(f64::NEG_INFINITY, end)
+            } else {
+                Span::new(-end, f64::INFINITY)
+            };
+        }
         let e = u.y * dy - c;
-        let half = if u.x > 1e-12 {
-            Span::new(f64::NEG_INFINITY, -e / u.x)
-        } else if u.x < -1e-12 {
-            Span::new(-e / u.x, f64::INFINITY)
+        let straight = self.strip_row(across).meet(if u.x > PARALLEL {
+            Span::new(f64::NEG_INFINITY, -e * self.inv_u.x)
+        } else if u.x < -PARALLEL {
+            Span::new(-e * self.inv_u.x, f64::INFINITY)
         } else if e <= 0.0 {
             Span::ALL
         } else {
             Span::EMPTY
-        };
-        let straight = strip.meet(half);
+        });
         if mp < 1e-9 {
             return straight;
         }
         let mp2 = mp * mp;
-        let a = u.x * u.x + mp2 * u.y * u.y;
         let b = u.x * (e - mp2 * u.y * dy);
-        let d = b * b - a * (e * e + mp2 * (across * across - r * r));
+        let d = b * b - self.a * (e * e + mp2 * (across * across - r * r));
         if d < 0.0 {
             return straight;
         }
         let d = d.sqrt();
-        straight.hull(Span::new((-b - d) / a, (d - b) / a))
+        straight.hull(Span::new((-b - d) * self.inv_a, (d - b) * self.inv_a))
+    }
+
+    /// The part of the strip `|q| <= R` on a row, by `u.x` times its height. The strip is not level.
+    fn strip_row(&self, across: f64) -> Span {
+        let (a, b) = ((across - self.r) * self.inv_u.y, (across + self.r) * self.inv_u.y);
+        Span::new(a.min(b), a.max(b))
     }
 }
 
@@ -166,14 +187,14 @@ pub(super) struct Stamp {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Along {
     low: DVec3,
-    high_y: f64,
     dir: Behind,
     len: f64,
     m: f64,
     root: f64,
     tip: Tip,
-    /// Another move serves the nodes beyond the lower (upper) end.
-    joined: [bool; 2],
+    /// For the lower and the upper end: how far beyond it (in s - m'w) the move still has to look, because another
+    /// one serves what lies farther; `None` where there is no other.
+    look: [Option<f64>; 2],
 }
 
 /// Direction in plan, length in plan and slope of a move; `None` for plunges and retracts.
@@ -191,59 +212,96 @@ impl Course {
         (len > VERTICAL_MM).then(|| Self { u: d.truncate() / len, len, m: d.z / len })
     }
 
+    /// The slope m' of the formulas, with its sign; a flat cutter knows up and down only.
+    fn mp(&self, tip: Tip) -> f64 {
+        if !tip.flat {
+            self.m / (1.0 + self.m * self.m).sqrt()
+        } else if self.m < 0.0 {
+            -1.0
+        } else {
+            1.0
+        }
+    }
+
     /// The set of places from which the move pulls a node backward, turned so that it rises,
     /// and whether it had to be turned.
     fn behind(&self, tip: Tip) -> (Behind, bool) {
-        let m = self.m.abs();
-        let mp = if tip.flat { 1.0 } else { m / (1.0 + m * m).sqrt() };
         let turned = self.m < 0.0;
-        (Behind { u: if turned { -self.u } else { self.u }, mp, r: tip.radius }, turned)
+        (Behind::new(if turned { -self.u } else { self.u }, self.mp(tip).abs(), tip.radius), turned)
     }
 }
 
-/// True when the two moves are one chain: the second goes on where the first ends, neither is vertical.
-pub(super) fn joined(a: &Move, b: &Move) -> bool {
-    a.to == b.from
-        && a.is_rapid() == b.is_rapid()
-        && Course::of(a).is_some()
-        && Course::of(b).is_some()
+/// What happens where a move ends and the next one begins.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Joint {
+    /// No chain: both moves have a free end here.
+    None,
+    /// A chain whose wedge is so thin that both moves together serve it by looking this far beyond the joint, mm.
+    Thin(f64),
+    /// A chain with a wedge that the cutter, standing on the joint, serves.
+    Wedge,
+}
+
+impl Joint {
+    /// The joint of two consecutive moves; a wedge up to `thin_mm` wide is thin.
+    pub(super) fn of(a: &Move, b: &Move, tip: Tip, thin_mm: f64) -> Self {
+        if a.to != b.from || a.is_rapid() != b.is_rapid() {
+            return Self::None;
+        }
+        let (Some(ca), Some(cb)) = (Course::of(a), Course::of(b)) else { return Self::None };
+        if tip.flat {
+            // A flat cutter's joint only matters where it goes down and then does not.
+            return if ca.m < 0.0 && cb.m >= 0.0 { Self::Wedge } else { Self::Thin(0.0) };
+        }
+        let (ma, mb) = (ca.mp(tip), cb.mp(tip));
+        let turn = ca.u.distance(cb.u);
+        // The wedge is s_a - ma w_a >= 0 >= s_b - mb w_b; s changes by at most R turn, w by R sqrt(2 turn).
+        let width = (mb - ma).max(0.0) + turn + mb.abs() * (2.0 * turn).sqrt();
+        let width_mm = tip.radius * width;
+        if width_mm <= thin_mm { Self::Thin(width_mm) } else { Self::Wedge }
+    }
+
+    fn look(self) -> Option<f64> {
+        match self {
+            Self::None => None,
+            Self::Thin(mm) => Some(mm),
+            Self::Wedge => Some(0.0),
+        }
+    }
 }
 
 impl Sweep {
-    /// The volume of one move; `joined` says whether a neighbour serves the nodes beyond its start and end.
-    pub(super) fn of(mv: &Move, tip: Tip, joined: [bool; 2]) -> Self {
+    /// The volume of one move between the joints at its start and its end.
+    pub(super) fn of(mv: &Move, tip: Tip, joints: [Joint; 2]) -> Self {
         let Some(course) = Course::of(mv) else {
             let at = if mv.from.z < mv.to.z { mv.from } else { mv.to };
             return Self::Stamp(Stamp { at, tip, wedge: None });
         };
         let (dir, turned) = course.behind(tip);
-        let (low, high) = if turned { (mv.to, mv.from) } else { (mv.from, mv.to) };
+        // What a thin wedge asks for is served by the move that ends there.
+        let start = joints[0].look().map(|_| 0.0);
+        let (from, to) = (start, joints[1].look());
         let m = course.m.abs();
         Self::Along(Along {
-            low,
-            high_y: high.y,
+            low: if turned { mv.to } else { mv.from },
             dir,
             len: course.len,
             m,
             root: (1.0 + m * m).sqrt(),
             tip,
-            joined: if turned { [joined[1], joined[0]] } else { joined },
+            look: if turned { [to, from] } else { [from, to] },
         })
     }
 
-    /// The wedge at the joint of two moves of a chain, unless it is empty.
+    /// The cutter standing on the joint of two moves of a chain, as far as the wedge goes.
     pub(super) fn wedge(a: &Move, b: &Move, tip: Tip) -> Option<Self> {
         let (ca, cb) = (Course::of(a)?, Course::of(b)?);
-        if tip.flat {
-            let full = ca.m < 0.0 && cb.m >= 0.0;
-            return full.then_some(Self::Stamp(Stamp { at: a.to, tip, wedge: None }));
-        }
-        if cb.m <= ca.m && (ca.u - cb.u).abs().max_element() < 1e-12 {
-            return None;
-        }
-        let (da, ta) = ca.behind(tip);
-        let (db, tb) = cb.behind(tip);
-        Some(Self::Stamp(Stamp { at: a.to, tip, wedge: Some([(da, ta), (db, !tb)]) }))
+        let wedge = (!tip.flat).then(|| {
+            let (da, ta) = ca.behind(tip);
+            let (db, tb) = cb.behind(tip);
+            [(da, ta), (db, !tb)]
+        });
+        Some(Self::Stamp(Stamp { at: a.to, tip, wedge }))
     }
 
     /// Lowest and highest y it can touch.
@@ -251,74 +309,73 @@ impl Sweep {
         match self {
             Self::Stamp(s) => (s.at.y - s.tip.radius, s.at.y + s.tip.radius),
             Self::Along(a) => {
-                (a.low.y.min(a.high_y) - a.tip.radius, a.low.y.max(a.high_y) + a.tip.radius)
-            }
-        }
-    }
-
-    /// The point that the spans and offsets of [`Sweep::spans`] and [`Sweep::left`] count from.
-    pub(super) fn anchor(&self) -> DVec3 {
-        match self {
-            Self::Stamp(s) => s.at,
-            Self::Along(a) => a.low,
-        }
-    }
-
-    /// The spans of x (relative to the anchor) to look at on the row `dy` above the anchor.
-    pub(super) fn spans(&self, dy: f64) -> [Span; 4] {
-        const E: Span = Span::EMPTY;
-        match self {
-            Self::Stamp(s) => {
-                let mut out = [disc_row(s.tip.radius, dy), E, E, E];
-                for (behind, inside) in s.wedge.iter().flatten() {
-                    let row = behind.row(0.0, dy);
-                    if *inside {
-                        out = out.map(|o| o.meet(row));
-                    } else {
-                        let [a, b] = out[0].without(row);
-                        let [c, d] = out[1].without(row);
-                        out = [a, b, c, d];
-                    }
-                }
-                out
-            }
-            Self::Along(a) => {
-                let mut base = match a.joined {
-                    [true, true] => a.dir.row(a.len, dy),
-                    [_, high] => {
-                        let stadium = a.stadium_row(dy);
-                        if high { stadium.meet(a.dir.row(a.len, dy)) } else { stadium }
-                    }
+                let (u, r) = (a.dir.u, a.tip.radius);
+                // The strip lies in a rectangle in s and q; free ends add their discs.
+                let (lo, hi, across) = match a.look {
+                    [Some(lo), Some(hi)] => (-lo, a.len + hi + a.dir.mp * r, r * u.x.abs()),
+                    _ => (0.0, a.len, r),
                 };
-                base.lo -= SPAN_SLACK_MM;
-                base.hi += SPAN_SLACK_MM;
-                if !a.joined[0] {
-                    return [base, E, E, E];
-                }
-                let [l, r] = base.without(a.dir.row(0.0, dy));
-                [l, r, E, E]
+                let (p, q) = (lo * u.y, hi * u.y);
+                let slack = across + SPAN_SLACK_MM;
+                (a.low.y + p.min(q) - slack, a.low.y + p.max(q) + slack)
             }
         }
+    }
+}
+
+impl Stamp {
+    /// The point that spans and offsets count from.
+    pub(super) fn anchor(&self) -> DVec3 {
+        self.at
+    }
+
+    /// The spans of x to look at on the row `dy` above the anchor.
+    #[inline]
+    pub(super) fn spans(&self, dy: f64) -> [Span; 4] {
+        let mut out = [disc_row(self.tip.radius, dy), Span::EMPTY, Span::EMPTY, Span::EMPTY];
+        for (behind, inside) in self.wedge.iter().flatten() {
+            let row = behind.row(0.0, dy);
+            if *inside {
+                out = out.map(|o| o.meet(row));
+            } else {
+                let [a, b] = out[0].without(row);
+                let [c, d] = out[1].without(row);
+                out = [a, b, c, d];
+            }
+        }
+        out
     }
 
     /// What it leaves at the node `d` from the anchor; `None` where it does not come.
     #[inline]
     pub(super) fn left(&self, d: DVec2) -> Option<Left> {
-        match self {
-            Self::Stamp(s) => {
-                let h2 = s.tip.radius * s.tip.radius - d.length_squared();
-                if h2 < 0.0 {
-                    return None;
-                }
-                let z = if s.tip.flat { s.at.z } else { s.at.z + s.tip.radius - h2.sqrt() };
-                Some(Left { z, tip: s.at.z })
-            }
-            Self::Along(a) => a.left(d),
+        let h2 = self.tip.radius * self.tip.radius - d.length_squared();
+        if h2 < 0.0 {
+            return None;
         }
+        let up = if self.tip.flat { 0.0 } else { self.tip.radius - h2.sqrt() };
+        Some(Left { z: self.at.z + up, tip: self.at.z })
     }
 }
 
 impl Along {
+    /// The point that spans and offsets count from.
+    pub(super) fn anchor(&self) -> DVec3 {
+        self.low
+    }
+
+    /// The spans of x to look at on the row `dy` above the anchor.
+    #[inline]
+    pub(super) fn spans(&self, dy: f64) -> [Span; 2] {
+        let base = match self.look {
+            [Some(_), Some(hi)] => self.dir.row(self.len + hi, dy),
+            [None, Some(hi)] => self.stadium_row(dy).meet(self.dir.row(self.len + hi, dy)),
+            [_, None] => self.stadium_row(dy),
+        };
+        let Some(lo) = self.look[0] else { return [base, Span::EMPTY] };
+        base.without(self.dir.row(-lo, dy))
+    }
+
     /// The part of the stadium (all that the cutter passes over) on the row `dy` above the lower end.
     fn stadium_row(&self, dy: f64) -> Span {
         let (u, r) = (self.dir.u, self.tip.radius);
@@ -326,15 +383,14 @@ impl Along {
         let other = disc_row(r, dy - end.y);
         let discs = disc_row(r, dy).hull(Span::new(other.lo + end.x, other.hi + end.x));
         let across = u.x * dy;
-        let strip = if u.y.abs() > 1e-12 {
-            let (a, b) = ((across - r) / u.y, (across + r) / u.y);
-            Span::new(a.min(b), a.max(b))
+        let strip = if u.y.abs() > PARALLEL {
+            self.dir.strip_row(across)
         } else if across.abs() <= r {
             Span::ALL
         } else {
             Span::EMPTY
         };
-        let along = if u.x.abs() > 1e-12 {
+        let along = if u.x.abs() > PARALLEL {
             let (a, b) = (-u.y * dy / u.x, (self.len - u.y * dy) / u.x);
             Span::new(a.min(b), a.max(b))
         } else if (0.0..=self.len).contains(&(u.y * dy)) {
@@ -345,8 +401,9 @@ impl Along {
         discs.hull(strip.meet(along))
     }
 
+    /// What it leaves at the node `d` from the anchor; `None` where it does not come.
     #[inline]
-    fn left(&self, d: DVec2) -> Option<Left> {
+    pub(super) fn left(&self, d: DVec2) -> Option<Left> {
         let u = self.dir.u;
         let r = self.tip.radius;
         let s = u.x * d.x + u.y * d.y;

@@ -21,18 +21,25 @@ pub(super) enum Motion {
     Arc(Turn),
 }
 
+/// What coordinates count from.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Distance {
+    Absolute,
+    Incremental,
+}
+
 /// The words of one line.
 #[derive(Debug, Default)]
 pub(super) struct Line {
     pub(super) motion: Option<Motion>,
     pub(super) plane: Option<Plane>,
-    pub(super) relative: Option<bool>,
+    pub(super) distance: Option<Distance>,
     pub(super) inches: Option<bool>,
     pub(super) spindle: Option<bool>,
     pub(super) dwell: bool,
     pub(super) end: bool,
-    feed_mode: bool,
-    work_offset: bool,
+    feed_mode: Option<()>,
+    work_offset: Option<()>,
     /// Letters of this line, and those whose value nobody has taken yet; bit 0 = A.
     seen: u32,
     open: u32,
@@ -74,9 +81,13 @@ impl Line {
         (self.open != 0).then(|| b'A' + self.open.trailing_zeros() as u8)
     }
 
+    /// Forgets the last line. Values and columns stay: nobody asks for those of letters not seen.
     fn clear(&mut self) {
-        let (values, columns) = (self.values, self.columns);
-        *self = Self { values, columns, ..Self::default() };
+        (self.motion, self.plane, self.distance) = (None, None, None);
+        (self.inches, self.spindle) = (None, None);
+        (self.dwell, self.end) = (false, false);
+        (self.feed_mode, self.work_offset) = (None, None);
+        (self.seen, self.open) = (0, 0);
     }
 
     /// Notes a word; the error is the fault of it.
@@ -122,10 +133,10 @@ impl Line {
             Some(19) => once(&mut self.plane, Plane::Yz),
             Some(20) => once(&mut self.inches, true),
             Some(21) => once(&mut self.inches, false),
-            Some(54) => flag(&mut self.work_offset),
-            Some(90) => once(&mut self.relative, false),
-            Some(91) => once(&mut self.relative, true),
-            Some(94) => flag(&mut self.feed_mode),
+            Some(54) => once(&mut self.work_offset, ()),
+            Some(90) => once(&mut self.distance, Distance::Absolute),
+            Some(91) => once(&mut self.distance, Distance::Incremental),
+            Some(94) => once(&mut self.feed_mode, ()),
             _ => Err(Fault::UnknownWord),
         }
     }
@@ -167,8 +178,7 @@ fn flag(slot: &mut bool) -> Result<(), fn(String) -> Fault> {
 pub(super) fn next_line(text: &[u8], line: &mut Line) -> Result<usize, (u32, Fault)> {
     line.clear();
     let mut at = 0;
-    loop {
-        let Some(&c) = text.get(at) else { break };
+    while let Some(&c) = text.get(at) {
         match c {
             b'\n' | b'\r' => break,
             b' ' | b'\t' => at += 1,
