@@ -20,7 +20,7 @@
 //! | `motion` | plain moves, one after another -> time, speed, position: GRBL's planner as a model, incremental | geom job |
 //! | `toolpath` | target, offset, stock, operation -> `Toolpath`: rough, raster, linking, fitting, feeds | geom job cutter outline relief offset stock motion |
 //! | `gcode` | `gcode::write`: `Toolpath` -> text by dialect. `gcode::read`: text -> plain moves with line numbers. Neither imports the other | geom job toolpath (write only) |
-//! | `proof` | program text + job -> verdict (gouge, leftover, rapids, envelope, feeds, time) | geom job cutter relief stock motion gcode::read |
+//! | `proof` | program text + job -> verdict (gouge, leftover, rapids, envelope, feeds, time) | geom job cutter relief stock motion `gcode::read` |
 //! | `report` | pictures (PNG), HTML report, mesh export, summaries | all above |
 //! | `cli` | one file per command; the only place with files, clock, terminal, fonts, ports | all |
 //!

@@ -39,7 +39,7 @@ fn read_table(lib: &str) -> Table {
             }
             _ => {
                 let mut words = uses.split_whitespace().peekable();
-                while let Some(word) = words.next() {
+                while let Some(word) = words.next().map(|w| w.trim_matches('`')) {
                     let mut part = String::new();
                     if let Some(p) = words.peek().and_then(|w| w.strip_prefix('(')) {
                         part = p.to_string();

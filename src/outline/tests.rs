@@ -1,7 +1,7 @@
 //! Areas, laws and notes of traced artwork.
 
 use super::*;
-use crate::artwork::{Fonts, Placed, read_svg};
+use crate::artwork::{Fonts, read_svg};
 use crate::geom::Tolerance;
 use crate::job::{Combine, LayerSpec, Profile, Selector, SurfaceSpec};
 

@@ -56,6 +56,10 @@ fn job(layers: Vec<LayerSpec>) -> Job {
         clearance_mm: 0.5,
         ramp_rad: 0.1,
         strict: false,
+        artwork_unit_mm: 1.0,
+        artwork_lower_left_mm: DVec2::ZERO,
+        artwork_size_mm: DVec2::ONE,
+        notes: vec![],
     }
 }
 
