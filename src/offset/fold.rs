@@ -64,64 +64,113 @@ pub(super) fn fold(path: Path, quarter: &Quarter, z: &[f32], nx: usize) -> Vec<f
     out
 }
 
-/// Neighbouring columns of one row, aligned for the widest vectors.
+/// Columns of a [`Lane16`].
+const LANES: usize = 16;
+
+/// Neighbouring columns of one row: what the widest vector holds. Loops over more lanes than this are no
+/// longer unrolled, and then not kept in registers.
 #[derive(Debug, Clone, Copy)]
 #[repr(align(64))]
-struct Lanes<const W: usize>([f32; W]);
+struct Lane16([f32; LANES]);
 
-/// The larger in every lane. Written out: LLVM does not vectorise the maxima of the standard library.
-#[inline(always)]
-fn raise<const W: usize>(to: &mut [f32; W], by: impl Fn(usize) -> f32) {
-    for lane in 0..W {
-        let value = by(lane);
-        to[lane] = if value > to[lane] { value } else { to[lane] };
+impl Lane16 {
+    const EMPTY: Self = Self([f32::NEG_INFINITY; LANES]);
+
+    #[inline(always)]
+    fn load(from: &[f32; LANES]) -> Self {
+        Self(*from)
+    }
+
+    #[inline(always)]
+    fn plus(mut self, term: f32) -> Self {
+        for lane in &mut self.0 {
+            *lane += term;
+        }
+        self
+    }
+
+    /// The larger in every lane. Written out: LLVM does not vectorise the maxima of the standard library.
+    #[inline(always)]
+    fn max(mut self, other: Self) -> Self {
+        for lane in 0..LANES {
+            let (a, b) = (self.0[lane], other.0[lane]);
+            self.0[lane] = if b > a { b } else { a };
+        }
+        self
     }
 }
 
-/// Folds one band, `W` columns at a time.
+/// The highest of pair + depth in every lane, for two rows of depths, the longer one first.
 #[inline(always)]
-pub(super) fn fold_band<const W: usize>(band: &mut Band) {
-    let (nx, rows) = (band.nx, band.out.len() / band.nx);
+fn sum_two<const N: usize>(pairs: &[[Lane16; N]], near: &[f32], far: &[f32]) -> [[Lane16; N]; 2] {
+    let (mut a, mut b) = ([Lane16::EMPTY; N], [Lane16::EMPTY; N]);
+    let (both, rest) = near.split_at(far.len());
+    for ((pair, &deep), &deeper) in pairs.iter().zip(both).zip(far) {
+        for n in 0..N {
+            a[n] = a[n].max(pair[n].plus(deep));
+            b[n] = b[n].max(pair[n].plus(deeper));
+        }
+    }
+    for (pair, &deep) in pairs[far.len()..].iter().zip(rest) {
+        for n in 0..N {
+            a[n] = a[n].max(pair[n].plus(deep));
+        }
+    }
+    [a, b]
+}
+
+/// Folds one band, `N` times sixteen columns at a time.
+#[inline(always)]
+pub(super) fn fold_band<const N: usize>(band: &mut Band) {
+    let (nx, rows, width) = (band.nx, band.out.len() / band.nx, N * LANES);
     let ny = band.z.len() / nx;
     let (y0, reach) = (band.first_row, band.quarter.reach());
-    let empty = Lanes([f32::NEG_INFINITY; W]);
-    let mut tile = vec![empty; rows];
-    let mut pairs = vec![empty; reach + 1];
-    let mut line = vec![f32::NEG_INFINITY; W + 2 * reach];
-    for x0 in (0..nx).step_by(W) {
-        tile.fill(empty);
+    let mut tile = vec![[Lane16::EMPTY; N]; rows];
+    let mut pairs = vec![[Lane16::EMPTY; N]; reach + 1];
+    let mut line = vec![f32::NEG_INFINITY; width + 2 * reach];
+    for x0 in (0..nx).step_by(width) {
+        tile.fill([Lane16::EMPTY; N]);
         // The part of a row that the tile sees, with nothing beyond the rim.
-        let (from, to) = (x0.saturating_sub(reach), (x0 + W + reach).min(nx));
+        let (from, to) = (x0.saturating_sub(reach), (x0 + width + reach).min(nx));
         let at = from + reach - x0;
         line.fill(f32::NEG_INFINITY);
         for y in y0.saturating_sub(reach)..(y0 + rows + reach).min(ny) {
             line[at..at + to - from].copy_from_slice(&band.z[y * nx + from..y * nx + to]);
             for (dx, pair) in pairs.iter_mut().enumerate() {
-                let left: &[f32] = &line[reach - dx..reach - dx + W];
-                let right: &[f32] = &line[reach + dx..reach + dx + W];
-                for lane in 0..W {
-                    let (a, b) = (left[lane], right[lane]);
-                    pair.0[lane] = if a > b { a } else { b };
+                let left = line[reach - dx..reach - dx + width].as_chunks().0;
+                let right = line[reach + dx..reach + dx + width].as_chunks().0;
+                for n in 0..N {
+                    pair[n] = Lane16::load(&left[n]).max(Lane16::load(&right[n]));
                 }
             }
-            // Rows y - dy and y + dy, as far as they lie in the band.
+            // Rows y - dy and y + dy, as far as they lie in the band; two dy at a time, so that every
+            // pair is loaded once for both.
             let nearest = y0.saturating_sub(y).max((y + 1).saturating_sub(y0 + rows));
-            for (dy, depths) in band.quarter.rows.iter().enumerate().skip(nearest) {
-                let mut sum = [f32::NEG_INFINITY; W];
-                for (pair, &depth) in pairs.iter().zip(depths) {
-                    raise(&mut sum, |lane| pair.0[lane] + depth);
-                }
-                if y + dy >= y0 && y + dy < y0 + rows {
-                    raise(&mut tile[y + dy - y0].0, |lane| sum[lane]);
-                }
-                if dy > 0 && y >= y0 + dy && y - dy < y0 + rows {
-                    raise(&mut tile[y - dy - y0].0, |lane| sum[lane]);
+            for dy in (nearest..=reach).step_by(2) {
+                let near = &band.quarter.rows[dy][..];
+                let far = band.quarter.rows.get(dy + 1).map_or(&[][..], |far| far);
+                let sums = sum_two(&pairs, near, far);
+                for (dy, sum) in [dy, dy + 1].into_iter().zip(&sums) {
+                    if y + dy >= y0 && y + dy < y0 + rows {
+                        let row = &mut tile[y + dy - y0];
+                        for n in 0..N {
+                            row[n] = row[n].max(sum[n]);
+                        }
+                    }
+                    if dy > 0 && y >= y0 + dy && y - dy < y0 + rows {
+                        let row = &mut tile[y - dy - y0];
+                        for n in 0..N {
+                            row[n] = row[n].max(sum[n]);
+                        }
+                    }
                 }
             }
         }
-        let width = W.min(nx - x0);
-        for (row, lanes) in band.out.chunks_exact_mut(nx).zip(&tile) {
-            row[x0..x0 + width].copy_from_slice(&lanes.0[..width]);
+        let width = width.min(nx - x0);
+        for (row, tile) in band.out.chunks_exact_mut(nx).zip(&tile) {
+            for (row, lanes) in row[x0..x0 + width].chunks_mut(LANES).zip(tile) {
+                row.copy_from_slice(&lanes.0[..row.len()]);
+            }
         }
     }
 }

@@ -51,20 +51,20 @@ pub(super) fn fold_band(path: Path, band: &mut Band) {
         // SAFETY: `Path::available` is the only source of this path and has seen AVX2.
         #[cfg(target_arch = "x86_64")]
         Path::Avx2 => unsafe { fold_band_avx2(band) },
-        Path::Baseline => fold::fold_band::<16>(band),
+        Path::Baseline => fold::fold_band::<1>(band),
     }
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx512f")]
 fn fold_band_avx512(band: &mut Band) {
-    fold::fold_band::<64>(band);
+    fold::fold_band::<2>(band);
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2")]
 fn fold_band_avx2(band: &mut Band) {
-    fold::fold_band::<32>(band);
+    fold::fold_band::<2>(band);
 }
 
 /// [`exact::tilt_row`] on a path.
