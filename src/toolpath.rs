@@ -25,7 +25,7 @@ mod tests;
 
 pub use check::PathFault;
 
-use crate::geom::{Heightfield, Move};
+use crate::geom::{Heightfield, Move, MoveKind};
 use crate::job::{CutterSpec, Job, Operation, OperationKind};
 use crate::stock::Block;
 use emit::Emitter;
@@ -204,7 +204,7 @@ pub fn plan(
         for note in notes(&site, &out) {
             observe(PlanEvent::Note(note));
         }
-        join(&mut paths, operation, out.into_moves(), job);
+        join(&mut paths, operation, out.into_moves());
     }
     if paths.is_empty() {
         return Err(ToolpathError::NothingToCut);
@@ -220,7 +220,7 @@ fn check_target(job: &Job, target: &Heightfield) -> Result<(), ToolpathError> {
     const SLACK_MM: f64 = 1e-4;
     let (stock, field) = (job.stock.bounds(), target.grid().bounds());
     let outside_mm = (field.min - stock.min).max(stock.max - field.max).max_element();
-    if !(outside_mm <= SLACK_MM) {
+    if outside_mm > SLACK_MM {
         return Err(ToolpathError::TargetTooSmall { outside_mm });
     }
     let bottom_mm = -job.stock.thickness_mm;
@@ -269,25 +269,28 @@ fn notes(site: &Site, out: &Emitter) -> Vec<String> {
 }
 
 /// Puts an operation's moves into the last program when cutter and speed are the same, else into a new one.
-fn join(paths: &mut Vec<Toolpath>, operation: &Operation, moves: Vec<Move>, job: &Job) {
-    let (Some(first), cutter) = (moves.first(), &operation.cutter) else { return };
-    let kind = kind_name(operation);
-    if let Some(path) = paths.last_mut() {
-        if path.cutter == *cutter && path.spindle_rpm == operation.spindle_rpm {
-            if let Some(last) = path.moves.last() {
-                if last.to != first.from {
-                    let (from, to) = (last.to, first.from);
-                    debug_assert!(from.z == to.z, "operations end at {} mm", job.safe_z_mm);
-                    path.moves.push(Move { from, to, kind: crate::geom::MoveKind::Rapid, line: 0 });
-                }
-            }
-            path.moves.extend(moves);
-            if !path.name.split('-').any(|word| word == kind) {
-                let kinds = path.name.trim_end_matches(&format!("-{}", cutter.name)).to_owned();
-                path.name = format!("{kinds}-{kind}-{}", cutter.name);
-            }
-            return;
+fn join(paths: &mut Vec<Toolpath>, operation: &Operation, moves: Vec<Move>) {
+    let (Some(first), cutter, kind) = (moves.first(), &operation.cutter, kind_name(operation))
+    else {
+        return;
+    };
+    if let Some(path) = paths.last_mut()
+        && path.cutter == *cutter
+        && path.spindle_rpm == operation.spindle_rpm
+    {
+        // Both ends are at safe Z.
+        if let Some(last) = path.moves.last()
+            && last.to != first.from
+        {
+            let between = Move { from: last.to, to: first.from, kind: MoveKind::Rapid, line: 0 };
+            path.moves.push(between);
         }
+        path.moves.extend(moves);
+        let kinds = path.name.strip_suffix(&format!("-{}", cutter.name)).unwrap_or(&path.name);
+        if !kinds.split('-').any(|word| word == kind) {
+            path.name = format!("{kinds}-{kind}-{}", cutter.name);
+        }
+        return;
     }
     paths.push(Toolpath {
         name: format!("{kind}-{}", cutter.name),

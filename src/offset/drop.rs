@@ -7,7 +7,7 @@
 //! (linear interpolation over a right triangle; Waldron 1998), and only the few facets and edges that may
 //! beat the best vertex are touched in closed form at the end.
 
-use super::blocks::{FAN, Level, levels};
+use super::blocks::{FAN, LANES, Level, levels};
 use super::contact::{Cell, TOUCH_MM, edge};
 use crate::cutter::Profile;
 use crate::geom::{DVec2, Grid, Heightfield};
@@ -16,7 +16,10 @@ use crate::geom::{DVec2, Grid, Heightfield};
 const WAITING: usize = 48;
 
 /// Fans of one level along x and y under which a search starts.
-const FEW: usize = 3;
+const FEW: usize = 2;
+
+/// Nodes of a row that are looked at together in `f32`; a leaf has fewer.
+const GLANCE: usize = 8;
 
 /// A ball is looked at cell by cell where its half chord is below this part of its radius.
 const STEEP_CHORD: f64 = 0.35;
@@ -39,8 +42,10 @@ struct Search<'d> {
     profile: Profile,
     radius_mm: f64,
     p: DVec2,
-    /// Highest tip so far.
+    /// Highest exact contact so far.
     best: f64,
+    /// What the highest contact is known to exceed or equal: the best, or vertices seen in `f32`.
+    floor: f64,
     /// The leaf of that contact.
     best_leaf: Block,
     /// Leaves whose facets and edges could beat the best vertex: (highest possible tip, leaf).
@@ -91,14 +96,13 @@ impl<'a> Dropper<'a> {
             radius_mm: profile.radius_mm(),
             p,
             best: f64::NEG_INFINITY,
+            floor: f64::NEG_INFINITY,
             best_leaf: (0, 0),
             waiting: [(0.0, (0, 0)); WAITING],
             waiting_len: 0,
         };
         match near {
-            Some(near) => {
-                search.vertices(near);
-            }
+            Some(near) => search.scout(near),
             None => search.guess(),
         }
         search.start();
@@ -120,7 +124,7 @@ impl Search<'_> {
         for _ in 0..2 {
             let cell = grid.to_grid(at).max(DVec2::ZERO).min(last);
             let (x, y) = (cell.x as usize / FAN, cell.y as usize / FAN);
-            self.vertices((x, y));
+            self.scout((x, y));
             let fan = &level.fans[y / FAN * level.nx + x / FAN];
             let slope = fan.slope(y % FAN * FAN + x % FAN);
             let one = if matches!(self.profile, Profile::Ball { .. }) { 1.0 } else { 1e-9 };
@@ -165,21 +169,25 @@ impl Search<'_> {
         let side_mm = level.cells as f64 * grid.pitch_mm;
         let corner =
             DVec2::new((fx * FAN) as f64, (fy * FAN) as f64) * side_mm + (grid.origin - self.p);
-        let mut bounds = level.fans[fy * level.nx + fx].bounds(&self.profile, corner, side_mm);
+        let bounds = level.fans[fy * level.nx + fx].bounds(&self.profile, corner, side_mm);
+        let (mut open, mut count) = ([(0.0, 0); LANES + 1], 0);
+        for (lane, &bound) in bounds.iter().enumerate() {
+            open[count] = (f64::from(bound), lane);
+            count += usize::from(f64::from(bound) > self.floor);
+        }
+        let open = &mut open[..count];
         loop {
-            let (mut bound, mut lane) = (f32::NEG_INFINITY, 0);
-            for (n, &b) in bounds.iter().enumerate() {
-                if b > bound {
-                    (bound, lane) = (b, n);
+            let mut top: Option<&mut (f64, usize)> = None;
+            for block in &mut *open {
+                if block.0 > top.as_ref().map_or(self.floor, |top| top.0) {
+                    top = Some(block);
                 }
             }
-            if f64::from(bound) <= self.best {
-                return;
-            }
-            bounds[lane] = f32::NEG_INFINITY;
+            let Some(&mut (ref mut bound, lane)) = top else { return };
+            let below = std::mem::replace(bound, f64::NEG_INFINITY);
             let block = (fx * FAN + lane % FAN, fy * FAN + lane / FAN);
             if depth == 0 {
-                self.leaf(block, f64::from(bound));
+                self.leaf(block, below);
             } else {
                 self.visit(depth - 1, block);
             }
@@ -211,6 +219,47 @@ impl Search<'_> {
         }
     }
 
+    /// Looks at the vertices of a leaf, to know early how high the tip will be at least.
+    fn scout(&mut self, leaf: Block) {
+        if self.is_ball() && self.grid().nx >= GLANCE {
+            self.glance(leaf);
+        } else {
+            self.vertices(leaf);
+        }
+    }
+
+    /// Tip height over the best vertex in and beside a leaf, in `f32`, and how far it may be off; for a ball.
+    fn glance(&mut self, (x, y): Block) -> (f64, f64) {
+        let grid = *self.grid();
+        let first = (x * FAN).min(grid.nx - GLANCE);
+        let (pitch, r) = (grid.pitch_mm as f32, self.radius_mm as f32);
+        // A slightly smaller ball, so that round-off never raises the tip.
+        let r2 = r * r * (1.0 - 1e-6);
+        let left = (first as f64 * grid.pitch_mm + (grid.origin.x - self.p.x)) as f32;
+        let mut best = [f32::NEG_INFINITY; GLANCE];
+        for k in 0..=FAN {
+            let j = (y * FAN + k).min(grid.ny - 1);
+            let dy = (j as f64 * grid.pitch_mm + (grid.origin.y - self.p.y)) as f32;
+            let row = &self.surface.row(j)[first..first + GLANCE];
+            let w2 = r2 - dy * dy;
+            for n in 0..GLANCE {
+                let dx = left + n as f32 * pitch;
+                let w2 = w2 - dx * dx;
+                let inside = if w2 > 0.0 { w2 } else { 0.0 };
+                // Beyond the rim the tip falls out of sight; a second test would cost the vectors.
+                let tip = row[n] - r + inside.sqrt() + (w2 - inside) * 1e30;
+                best[n] = if tip > best[n] { tip } else { best[n] };
+            }
+        }
+        let best = best.into_iter().fold(f32::NEG_INFINITY, |a, b| if b > a { b } else { a });
+        let best = f64::from(best);
+        let off = 4e-6 * (best.abs() + self.radius_mm);
+        if best - off > self.floor {
+            self.floor = best - off;
+        }
+        (best, off)
+    }
+
     /// Tip heights over the vertices of a leaf, row by row; the last row and column repeat at the rim.
     fn vertices(&mut self, (x, y): Block) -> [[f64; FAN + 1]; FAN + 1] {
         let grid = *self.grid();
@@ -222,7 +271,7 @@ impl Search<'_> {
         let columns: [usize; FAN + 1] = std::array::from_fn(column);
         let r = self.radius_mm;
         let beyond = (r + TOUCH_MM) * (r + TOUCH_MM);
-        let is_ball = matches!(self.profile, Profile::Ball { .. });
+        let is_ball = self.is_ball();
         let mut tips = [[f64::NEG_INFINITY; FAN + 1]; FAN + 1];
         let mut best = f64::NEG_INFINITY;
         for (k, tips) in tips.iter_mut().enumerate() {
@@ -231,30 +280,34 @@ impl Search<'_> {
             for n in 0..=FAN {
                 let square = squares_x[n] + square_y;
                 let z = f64::from(row[columns[n]]);
-                let tip = if is_ball { z - r + (r * r - square).max(0.0).sqrt() } else { z };
+                let left = r * r - square;
+                let left = if left > 0.0 { left } else { 0.0 };
+                let tip = if is_ball { z - r + left.sqrt() } else { z };
                 tips[n] = if square <= beyond { tip } else { f64::NEG_INFINITY };
                 best = if tips[n] > best { tips[n] } else { best };
             }
         }
-        if best > self.best {
-            self.best = best;
-            self.best_leaf = (x, y);
-        }
+        self.raise(best, (x, y));
         tips
+    }
+
+    fn is_ball(&self) -> bool {
+        matches!(self.profile, Profile::Ball { .. })
     }
 
     /// Looks at a leaf whose contacts lie no higher than `bound`.
     fn leaf(&mut self, leaf: Block, bound: f64) {
-        let is_ball = matches!(self.profile, Profile::Ball { .. });
-        let tips = self.vertices(leaf);
-        if !is_ball {
+        if !self.is_ball() {
+            self.vertices(leaf);
             self.cells(leaf);
             return;
         }
-        let top =
-            tips.as_flattened().iter().fold(f64::NEG_INFINITY, |a, &b| if b > a { b } else { a });
-        let bound = bound.min(top + self.bulge(leaf).unwrap_or(f64::INFINITY));
-        if bound <= self.best {
+        let mut bound = bound;
+        if self.grid().nx >= GLANCE {
+            let (top, off) = self.glance(leaf);
+            bound = bound.min(top + off + self.bulge(leaf).unwrap_or(f64::INFINITY));
+        }
+        if bound <= self.floor {
             return;
         }
         if self.waiting_len == WAITING {
@@ -281,7 +334,7 @@ impl Search<'_> {
     fn finish(&mut self) {
         let waiting = self.waiting;
         for &(bound, leaf) in &waiting[..self.waiting_len] {
-            if bound > self.best {
+            if bound > self.floor {
                 match self.bulge(leaf) {
                     Some(bulge) => self.facets(leaf, bulge),
                     None => self.cells(leaf),
@@ -296,6 +349,7 @@ impl Search<'_> {
         if tip > self.best {
             self.best = tip;
             self.best_leaf = leaf;
+            self.floor = self.floor.max(tip);
         }
     }
 
@@ -316,7 +370,7 @@ impl Search<'_> {
             for i in x * FAN..(x * FAN + FAN).min(nx - 1) {
                 let cell = self.cell(i, j);
                 let top = cell.z.into_iter().fold(f64::NEG_INFINITY, f64::max);
-                if top > self.best && self.tip_below(top, self.nearest((i, j), 1)) > self.best {
+                if top > self.floor && self.tip_below(top, self.nearest((i, j), 1)) > self.floor {
                     self.raise(cell.touch(&self.profile), (x, y));
                 }
             }
@@ -326,35 +380,39 @@ impl Search<'_> {
     /// Touches the facets and edges of a leaf, well inside a ball, that may beat the best contact.
     fn facets(&mut self, (x, y): Block, bulge: f64) {
         let tips = self.vertices((x, y));
-        let (nx, ny) = (self.grid().nx, self.grid().ny);
-        let columns = FAN.min(nx - 1 - x * FAN);
-        let lines = FAN.min(ny - 1 - y * FAN);
-        for dj in 0..=lines {
-            for di in 0..=columns {
-                let corner = |a: usize, b: usize| {
-                    let inside = di + a <= columns && dj + b <= lines;
-                    if inside { tips[dj + b][di + a] } else { f64::NEG_INFINITY }
-                };
-                let tops = [corner(0, 0), corner(1, 0), corner(0, 1), corner(1, 1)];
-                let top =
-                    tops.into_iter().fold(f64::NEG_INFINITY, |a, b| if b > a { b } else { a });
-                if top + bulge <= self.best {
-                    continue;
-                }
-                let (i, j) = (x * FAN + di, y * FAN + dj);
-                if di < columns && dj < lines {
-                    let tip = self.cell(i, j).touch_facets(&self.profile);
+        let (columns, lines) =
+            (FAN.min(self.grid().nx - 1 - x * FAN), FAN.min(self.grid().ny - 1 - y * FAN));
+        // Nodes as bits, eight to a row.
+        let bits = |columns: usize, lines: usize| {
+            (0..lines).fold(0_u64, |bits, dj| bits | (((1 << columns) - 1) << (8 * dj)))
+        };
+        let mut hot = 0_u64;
+        for (dj, tips) in tips.iter().enumerate() {
+            for (di, &tip) in tips.iter().enumerate() {
+                hot |= u64::from(tip + bulge > self.floor) << (8 * dj + di);
+            }
+        }
+        hot &= bits(columns + 1, lines + 1);
+        let node = |bit: u32| (bit as usize % 8, bit as usize / 8);
+        let mut cells = (hot | hot >> 1 | hot >> 8 | hot >> 9) & bits(columns, lines);
+        while cells != 0 {
+            let (di, dj) = node(cells.trailing_zeros());
+            cells &= cells - 1;
+            let tip = self.cell(x * FAN + di, y * FAN + dj).touch_facets(&self.profile);
+            self.raise(tip, (x, y));
+        }
+        for (a, b) in [(1, 0), (0, 1), (1, 1)] {
+            let mut edges = (hot | hot >> (a + 8 * b)) & bits(columns + 1 - a, lines + 1 - b);
+            while edges != 0 {
+                let (di, dj) = node(edges.trailing_zeros());
+                edges &= edges - 1;
+                let (from, to) = (tips[dj][di], tips[dj + b][di + a]);
+                // An edge bends by no more than the bulge; where its ends differ by four times as much,
+                // its top is an end.
+                if (from - to).abs() < 4.0 * bulge && from.max(to) + bulge > self.floor {
+                    let (i, j) = (x * FAN + di, y * FAN + dj);
+                    let tip = self.edge((i, j), (i + a, j + b));
                     self.raise(tip, (x, y));
-                }
-                for (a, b) in [(1, 0), (0, 1), (1, 1)] {
-                    let (from, to) = (tops[0], corner(a, b));
-                    // An edge bends by no more than the bulge; where its ends differ by four times as
-                    // much, its top is an end.
-                    let bends = (from - to).abs() < 4.0 * bulge;
-                    if bends && from.max(to) + bulge > self.best {
-                        let tip = self.edge((i, j), (i + a, j + b));
-                        self.raise(tip, (x, y));
-                    }
                 }
             }
         }

@@ -20,10 +20,10 @@ pub(super) fn chains(
     for start in 0..rows.len() {
         for k in 0..rows[start].len() {
             let Some(mut chain) = rows[start][k].take() else { continue };
-            if let Some(end) = chains.last().and_then(|c| c.last()) {
-                if end.distance_squared(chain[chain.len() - 1]) < end.distance_squared(chain[0]) {
-                    chain.reverse();
-                }
+            if let Some(end) = chains.last().and_then(|c| c.last())
+                && end.distance_squared(chain[chain.len() - 1]) < end.distance_squared(chain[0])
+            {
+                chain.reverse();
             }
             for row in &mut rows[start + 1..] {
                 if !extend(&mut chain, row, &mut link) {

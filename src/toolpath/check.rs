@@ -126,8 +126,7 @@ impl Toolpath {
         };
         let safe_z_mm = job.safe_z_mm;
         for z_mm in [first.from.z, last.to.z] {
-            // Written so that a NaN is refused, too.
-            if !((z_mm - safe_z_mm).abs() <= GRID_MM) {
+            if z_mm.is_nan() || (z_mm - safe_z_mm).abs() > GRID_MM {
                 return Err(PathFault::EndsLow { name: name(), z_mm, safe_z_mm });
             }
         }

@@ -44,9 +44,9 @@ fn roof(path: &[Sample], fit_mm: f64) -> Vec<f64> {
     let slope = |k: usize| ((path[k + 1].z - path[k].z) / (path[k + 1].s - path[k].s)).abs();
     let last = path.len() - 1;
     let mut roof: Vec<f64> = path.iter().map(|p| p.z).collect();
-    for k in 1..last {
+    for (k, z) in roof.iter_mut().enumerate().take(last).skip(1) {
         let m = slope(k - 1).min(slope(k));
-        roof[k] += fit_mm * (1.0 + m * m).sqrt();
+        *z += fit_mm * (1.0 + m * m).sqrt();
     }
     roof
 }
@@ -219,7 +219,7 @@ mod tests {
 
     #[test]
     fn without_tolerance_every_bend_stays() {
-        let zigzag = path(|s| f64::from(u8::from(s as u32 % 2 == 0)), 10.0, 10);
+        let zigzag = path(|s| f64::from(u8::from((s as u32).is_multiple_of(2))), 10.0, 10);
         assert_eq!(fit(&zigzag, 0.0).len(), 11);
     }
 

@@ -111,10 +111,10 @@ fn spans(survey: &Survey, z: f64, diameter_mm: f64) -> Vec<Span> {
     let mut spans = Vec::new();
     let mut open: Option<(f64, f64)> = None;
     let mut close = |open: &mut Option<(f64, f64)>| {
-        if let Some((from, to)) = open.take() {
-            if to - from >= SHORTEST_SPAN_PER_DIAMETER * diameter_mm {
-                spans.push([from, to].map(|s| point(&survey.row, s).extend(z)).to_vec());
-            }
+        if let Some((from, to)) = open.take()
+            && to - from >= SHORTEST_SPAN_PER_DIAMETER * diameter_mm
+        {
+            spans.push([from, to].map(|s| point(&survey.row, s).extend(z)).to_vec());
         }
     };
     for (sample, &wood) in survey.allowed.iter().zip(&survey.wood_mm) {

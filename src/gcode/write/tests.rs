@@ -172,3 +172,37 @@ proptest! {
         prop_assert!(read.next().is_none());
     }
 }
+
+#[test]
+fn a_planned_program_holds_exactly_the_planned_moves() {
+    use crate::job::Stepover;
+    use crate::toolpath::{fixture, plan};
+    let ops = vec![
+        fixture::rough(cutter(CutterShape::Flat, 3.0), 0.4, 1.5),
+        fixture::raster(cutter(CutterShape::Ball, 2.0), Stepover::Scallop(0.05), 30.0),
+    ];
+    let job = fixture_job(12.0, 9.0, 10.0, 0.25, ops);
+    let bump = |x, wall| fixture::Bump {
+        at: crate::geom::DVec2::new(x, 4.0),
+        radius_mm: 2.0,
+        height_mm: 2.0,
+        wall,
+    };
+    let target = fixture::relief(&job, 3.0, 0.0, &[bump(3.0, false), bump(9.0, true)]);
+    let paths = plan(&job, &target, &mut |_| ()).unwrap();
+    assert_eq!(paths.len(), 2);
+    for path in &paths {
+        let text = write(path, &["a carving".to_owned()], &job);
+        assert!(text.is_ascii() && text.lines().all(|l| l.len() <= MAX_LINE));
+        let read: Vec<_> = replay(&text).into_iter().skip(2).collect();
+        assert_eq!(read.len(), path.moves.len());
+        for ((at, feed), m) in read.iter().zip(&path.moves) {
+            assert_eq!(crate::geom::DVec3::from_array(*at), m.to);
+            let planned = match m.kind {
+                MoveKind::Rapid => 0.0,
+                MoveKind::Feed { feed_mm_per_min } => feed_mm_per_min,
+            };
+            assert_eq!(*feed, planned);
+        }
+    }
+}
