@@ -50,6 +50,18 @@ impl FixedGrid {
         Node { x: q.x as i32, y: q.y as i32 }
     }
 
+    /// The grid with every 16th line only, and resolved rings rounded to it and resolved again. Needles thinner
+    /// than the new grid close.
+    pub(crate) fn coarsened(&self, rings: &[NodeRing]) -> (Self, Vec<NodeRing>) {
+        let grid = Self { nodes_per_unit: self.nodes_per_unit / 16.0, ..*self };
+        let round = |v: i32| (v + 8).div_euclid(16);
+        let rounded: Vec<NodeRing> = rings
+            .iter()
+            .map(|ring| ring.iter().map(|n| Node { x: round(n.x), y: round(n.y) }).collect())
+            .collect();
+        (grid, union(&rounded))
+    }
+
     /// Where a node lies in the plane.
     pub(crate) fn point(&self, node: Node) -> DVec2 {
         self.center + DVec2::new(f64::from(node.x), f64::from(node.y)) / self.nodes_per_unit

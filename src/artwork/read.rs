@@ -24,6 +24,9 @@ const FARTHEST: f64 = 1e12;
 /// Styles, `use`, nested viewports, transforms and text are resolved; clip paths are honoured; a gradient
 /// becomes the average of its stops. Bitmaps, hidden and see-through things are named in the notes.
 ///
+/// Coordinates are good to a 24-bit fraction (`f32`), circles and elliptic arcs, which `usvg` turns into cubic
+/// curves, to 3e-4 of their radius: 0.02 mm at a radius of 70 mm.
+///
 /// # Errors
 /// Every [`ArtworkError`] but those of [`Artwork::place`]: text that is no SVG, broken numbers, references out
 /// of the file or in circles, missing fonts, and artwork without anything to carve.
@@ -131,7 +134,7 @@ impl Walker<'_> {
         let element = self.known(path.id()).or(scope.element);
         let name = self.name(element);
         let curve = curve::curve(path.data());
-        self.check_extent(&(scope.at * curve.clone()), &name)?;
+        Self::check_extent(&(scope.at * curve.clone()), &name)?;
         let fill = path.fill().filter(|_| has_area(&curve));
         if fill.is_none() && path.stroke().is_none() {
             self.unpainted(&curve, scope, element);
@@ -183,7 +186,7 @@ impl Walker<'_> {
         if let Some(color) = color {
             let tolerance = self.tolerance / stretch(scope.at);
             let outline = scope.at * stroke::outline(curve, stroke, tolerance, &name)?;
-            self.check_extent(&outline, &name)?;
+            Self::check_extent(&outline, &name)?;
             self.add(Part::Stroke, outline, FillRule::NonZero, color, scope, element);
         }
         Ok(())
@@ -289,7 +292,7 @@ impl Walker<'_> {
         Some(color)
     }
 
-    fn check_extent(&self, curve: &BezPath, name: &str) -> Result<(), ArtworkError> {
+    fn check_extent(curve: &BezPath, name: &str) -> Result<(), ArtworkError> {
         let r = kurbo::Shape::bounding_box(curve);
         let far = [r.x0, r.y0, r.x1, r.y1].into_iter().find(|v| v.is_nan() || v.abs() > FARTHEST);
         far.map_or(Ok(()), |v| {

@@ -169,7 +169,7 @@ fn decode(bytes: &[u8]) -> Result<String, ArtworkError> {
     }
     let text = std::str::from_utf8(bytes).map_err(|e| {
         let good = &bytes[..e.valid_up_to()];
-        ArtworkError::NotText { line: 1 + good.iter().filter(|b| **b == b'\n').count() }
+        ArtworkError::NotText { line: good.split(|b| *b == b'\n').count() }
     })?;
     Ok(text.strip_prefix('\u{feff}').unwrap_or(text).to_owned())
 }

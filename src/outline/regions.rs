@@ -37,6 +37,9 @@ pub(super) struct Built {
     pub(super) slivers: usize,
 }
 
+/// How often a figure that cannot be parted is rounded to a coarser grid: 4 nm, 60 nm, 1 um, from 0.24 nm on.
+const COARSER: usize = 3;
+
 /// Makes regions of resolved rings (figure on their left). Rings below `least_area` (mm^2) are dropped and
 /// counted.
 pub(super) fn build(
@@ -44,6 +47,21 @@ pub(super) fn build(
     grid: &FixedGrid,
     least_area: f64,
 ) -> Result<Built, RegionFault> {
+    let mut built = build_on(rings, grid, least_area);
+    // Two edges may leave a vertex at an angle so small that no move of a neighbour is small enough. Such needles
+    // are thinner than the grid; a coarser one closes them.
+    let mut coarse = (*grid, rings.to_vec());
+    for _ in 0..COARSER {
+        if built.is_ok() {
+            break;
+        }
+        coarse = coarse.0.coarsened(&coarse.1);
+        built = build_on(&coarse.1, &coarse.0, least_area);
+    }
+    built
+}
+
+fn build_on(rings: &[NodeRing], grid: &FixedGrid, least_area: f64) -> Result<Built, RegionFault> {
     let links = Links::of(rings);
     let points: Vec<DVec2> = links.nodes.iter().map(|n| grid.point(*n)).collect();
     let diagonal = bounds_of(&points).size().length();

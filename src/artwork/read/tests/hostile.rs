@@ -184,7 +184,7 @@ fn entities_that_unfold_without_end_are_refused() {
     let mut dtd = String::from("<!DOCTYPE svg [<!ENTITY a0 \"<rect width='5' height='5'/>\">");
     for i in 1..20 {
         let inner = format!("&a{};", i - 1).repeat(10);
-        dtd += &format!("<!ENTITY a{i} \"{inner}\">");
+        dtd.extend(["<!ENTITY a", &i.to_string(), " \"", &inner, "\">"]);
     }
     dtd += "]>";
     let e = refuse_text(&(dtd + &svg("&a19;")));
@@ -233,13 +233,19 @@ fn uses_that_unfold_without_end_are_refused() {
     let mut body = String::from("<g id='g0'><rect width='5' height='5'/></g>");
     for i in 1..12 {
         let inner = format!("<use href='#g{}'/>", i - 1).repeat(10);
-        body += &format!("<g id='g{i}'>{inner}</g>");
+        body.extend(["<g id='g", &i.to_string(), "'>", &inner, "</g>"]);
     }
     let e = refuse(&body);
     assert!(matches!(e, ArtworkError::TooBig { .. }), "{e}");
     let mut chain = String::from("<g id='g0'><rect width='5' height='5'/></g>");
     for i in 1..2000 {
-        chain += &format!("<g id='g{i}'><use href='#g{}'/></g>", i - 1);
+        chain.extend([
+            "<g id='g",
+            &i.to_string(),
+            "'><use href='#g",
+            &(i - 1).to_string(),
+            "'/></g>",
+        ]);
     }
     let e = refuse(&chain);
     assert!(matches!(e, ArtworkError::TooDeep { .. }), "{e}");
