@@ -17,11 +17,19 @@ impl Artwork {
             }
         };
         let layers = self.layers_found();
-        layers.iter().for_each(|l| add(l.select.clone()));
+        for layer in &layers {
+            add(layer.select.clone());
+        }
         for shape in shapes() {
-            shape.layers.iter().for_each(|l| add(Selector::Layer(l.clone())));
-            shape.labels.iter().for_each(|l| add(Selector::Label(l.clone())));
-            shape.ids.iter().for_each(|l| add(Selector::Id(l.clone())));
+            for name in &shape.layers {
+                add(Selector::Layer(name.clone()));
+            }
+            for name in &shape.labels {
+                add(Selector::Label(name.clone()));
+            }
+            for name in &shape.ids {
+                add(Selector::Id(name.clone()));
+            }
         }
         let size_of = |select: &Selector| {
             let chosen = shapes().filter(|s| s.is_selected_by(select));
