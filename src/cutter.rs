@@ -44,6 +44,15 @@ impl Profile {
         }
     }
 
+    /// The same form with a radius `by_mm` smaller, but not below zero: it lies inside this one.
+    #[must_use]
+    pub fn slimmed(&self, by_mm: f64) -> Self {
+        match *self {
+            Self::Flat { radius_mm } => Self::Flat { radius_mm: (radius_mm - by_mm).max(0.0) },
+            Self::Ball { radius_mm } => Self::Ball { radius_mm: (radius_mm - by_mm).max(0.0) },
+        }
+    }
+
     /// A cutting end that keeps at least `leave_mm` of wood, measured normal to the target, when its tip
     /// rides [`Profile::height_at`]-deep on the target and is then raised by `leave_mm`: the Minkowski sum
     /// with a ball for a ball, a disc around that sum (safe, a little more wood stays) for a flat.

@@ -4,9 +4,27 @@
 //! what hangs on it (size, stock, layers) and gives the final [`Job`]. Nothing here touches the disk.
 
 mod types;
+mod keys;
+mod error;
+mod colors;
+mod reader;
+mod library;
+mod draft;
+mod speeds;
+mod layer;
+mod operation;
+mod settle;
+mod write;
+#[cfg(test)]
+mod tests;
 
+pub use colors::swatch_name;
+pub use draft::Draft;
+pub use error::{Fault, JobError};
+pub use library::{BUILT_IN_FILES, Library};
 pub use types::{
-    ArtworkSpec, Background, Combine, CutterShape, CutterSpec, Fit, Job, LayerSpec, Machine,
-    Operation, OperationKind, Origin, Place, Profile, ReliefSpec, Rgb, Selector, Stepover, Stock,
-    SurfaceSpec, Wood,
+    ArtworkSpec, Background, Combine, CutterShape, CutterSpec, Fit, Found, FoundLayer, Job,
+    LayerSpec, Machine, Operation, OperationKind, Origin, Place, Profile, ReliefSpec, Rgb,
+    Selector, Stepover, Stock, SurfaceSpec, Wood,
 };
+pub use write::{defaults_table, template};

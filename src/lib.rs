@@ -20,7 +20,7 @@
 //! | `motion` | plain moves, one after another -> time, speed, position: GRBL's planner as a model, incremental | geom job |
 //! | `toolpath` | target, offset, stock, operation -> `Toolpath`: rough, raster, linking, fitting, feeds | geom job cutter outline relief offset stock motion |
 //! | `gcode` | `gcode::write`: `Toolpath` -> text by dialect. `gcode::read`: text -> plain moves with line numbers. Neither imports the other | geom job toolpath (write only) |
-//! | `proof` | program text + job -> verdict (gouge, leftover, rapids, envelope, feeds, time) | geom job cutter relief stock motion gcode::read |
+//! | `proof` | program text + job -> verdict (gouge, leftover, rapids, envelope, feeds, time) | geom job cutter relief stock motion `gcode::read` |
 //! | `report` | pictures (PNG), HTML report, mesh export, summaries | all above |
 //! | `cli` | one file per command; the only place with files, clock, terminal, fonts, ports | all |
 //!
@@ -40,3 +40,141 @@ pub mod toolpath;
 pub mod gcode;
 pub mod proof;
 pub mod report;
+#[cfg(feature = "cli")]
+pub mod cli;
+
+use artwork::{Artwork, ArtworkError};
+use job::{Draft, Job, JobError};
+use outline::{OutlineError, Outlines};
+use proof::{ProgramText, ProofError, Verdict};
+use relief::{Relief, ReliefError};
+use surface::SurfaceError;
+use toolpath::{PlanEvent, Toolpath, ToolpathError};
+
+/// What is to be carved: the job, its outlines and the target.
+#[derive(Debug)]
+pub struct Design {
+    /// The job with every setting known.
+    pub job: Job,
+    /// The outlines of its layers.
+    pub outlines: Outlines,
+    /// The target.
+    pub relief: Relief,
+    /// What the user should know.
+    pub notes: Vec<String>,
+}
+
+/// What a carving run gives: everything that is written or shown.
+#[derive(Debug)]
+pub struct Carving {
+    /// What is carved.
+    pub design: Design,
+    /// The toolpaths, one for each program.
+    pub paths: Vec<Toolpath>,
+    /// The programs, in the order of work.
+    pub programs: Vec<Program>,
+    /// What the proof found. Nothing may be written unless it passed.
+    pub verdict: Verdict,
+    /// What the user should know.
+    pub notes: Vec<String>,
+}
+
+/// A program: the bytes that are proved are the bytes that are written.
+#[derive(Debug, Clone)]
+pub struct Program {
+    /// File name: `1-rough-flat-6.nc`.
+    pub name: String,
+    /// The text.
+    pub text: String,
+}
+
+/// Why nothing can be carved: the first stage that refused.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+#[allow(missing_docs, reason = "each variant hands on the error of the stage of its name")]
+pub enum CarveError {
+    #[error(transparent)]
+    Job(#[from] JobError),
+    #[error(transparent)]
+    Artwork(#[from] ArtworkError),
+    #[error(transparent)]
+    Outline(#[from] OutlineError),
+    #[error(transparent)]
+    Surface(#[from] SurfaceError),
+    #[error(transparent)]
+    Relief(#[from] ReliefError),
+    #[error(transparent)]
+    Toolpath(#[from] ToolpathError),
+    #[error(transparent)]
+    Proof(#[from] ProofError),
+}
+
+/// Carves: from a checked draft and its artwork to proved programs. `enter` hears the name of each stage.
+///
+/// # Errors
+/// The first stage that refuses. A proof that ran and failed is no error: see [`Verdict::passed`].
+pub fn carve(
+    draft: Draft,
+    artwork: &Artwork,
+    enter: &mut dyn FnMut(&str),
+) -> Result<Carving, CarveError> {
+    let design = design(draft, artwork, enter)?;
+    let (job, target) = (&design.job, &design.relief.target);
+    let mut notes = design.notes.clone();
+
+    enter("toolpaths");
+    let paths = toolpath::plan(job, target, &mut |event| {
+        if let PlanEvent::Note(note) = event {
+            notes.push(note);
+        }
+    })?;
+    enter("g-code");
+    let programs: Vec<Program> =
+        paths.iter().enumerate().map(|(k, path)| emit(job, k + 1, path)).collect();
+    enter("reach");
+    let reach = offset::reach(job, target);
+    enter("proof");
+    let texts: Vec<ProgramText<'_>> = programs
+        .iter()
+        .zip(&paths)
+        .map(|(p, path)| ProgramText { name: &p.name, text: &p.text, cutter: &path.cutter })
+        .collect();
+    let verdict = proof::prove(&texts, job, target, &reach)?;
+    Ok(Carving { design, paths, programs, verdict, notes })
+}
+
+/// The stages up to the target.
+///
+/// # Errors
+/// As [`carve`].
+pub fn design(
+    draft: Draft,
+    artwork: &Artwork,
+    enter: &mut dyn FnMut(&str),
+) -> Result<Design, CarveError> {
+    enter("outlines");
+    let job = draft.settle(&artwork.found())?;
+    let placed = artwork.place(&job.layers, job.artwork_unit_mm, job.artwork_lower_left_mm)?;
+    let outlines = outline::trace(&placed, &job.layers, &job.tolerance)?;
+    enter("surfaces");
+    let grid = relief::grid_of(&job)?;
+    let raised = surface::raise_all(&outlines, &job.layers, &grid)?;
+    enter("merge");
+    let raised_notes = raised.notes.clone();
+    let relief = relief::merge(&job, &outlines, raised.surfaces, &grid)?;
+    let notes =
+        [&artwork.notes, &job.notes, &placed.notes, &outlines.notes, &raised_notes, &relief.notes]
+            .into_iter()
+            .flatten()
+            .cloned()
+            .collect();
+    Ok(Design { job, outlines, relief, notes })
+}
+
+/// The program of a toolpath, its header filled in.
+fn emit(job: &Job, number: usize, path: &Toolpath) -> Program {
+    let seconds = motion::seconds(&path.moves, &job.machine) + job.machine.spindle_dwell_s;
+    let file = gcode::write::file_stem(number, path);
+    let header = gcode::write::header(job, number, path, seconds);
+    Program { name: format!("{file}.nc"), text: gcode::write::write(path, &header, job) }
+}

@@ -15,10 +15,12 @@ mod drop;
 mod exact;
 mod field;
 mod fold;
+mod reach;
 mod simd;
 
 pub use drop::Dropper;
 pub use field::{closing, tip_field};
+pub use reach::reach;
 
 #[cfg(test)]
 mod tests;

@@ -1,4 +1,22 @@
 //! Curves -> [`Region`]s (outer ring + holes): flatten, resolve, orient, nest.
+//!
+//! ```text
+//!   curve --flatten--> rings --its own fill rule--> resolved rings --part, clean, nest--> Regions
+//!           chord_mm            (artwork::boolean)                    (regions)
+//! ```
+//!
+//! Artwork from the wild crosses itself, touches itself and doubles back. Each shape is resolved by its own fill
+//! rule on one fixed-point grid (nanometres), rings that touch are parted by a hair, and every [`Region`] that
+//! leaves here passes [`Region::check`]. What was changed is said in the notes; nothing is dropped in silence.
+
+mod check;
+mod edge_grid;
+mod notes;
+mod regions;
+mod trace;
+
+pub use check::RegionFault;
+pub use trace::trace;
 
 use crate::geom::{Bounds, DVec2, Ring, bounds_of, contains_even_odd, signed_area};
 
@@ -60,3 +78,62 @@ pub struct Outlines {
     /// What was changed in the artwork, for the user.
     pub notes: Vec<String>,
 }
+
+/// Why placed artwork cannot be turned into regions.
+#[derive(Debug, thiserror::Error, Clone, PartialEq)]
+#[non_exhaustive]
+pub enum OutlineError {
+    /// The chord tolerance is no positive number.
+    #[error("chord_mm = {chord_mm}: it must be a positive number, 0.02 as a rule")]
+    Chord {
+        /// What was given, mm.
+        chord_mm: f64,
+    },
+    /// A coordinate that is no number.
+    #[error("{shape}: its curve holds a coordinate that is no number; repair or remove it")]
+    NotFinite {
+        /// The shape.
+        shape: String,
+    },
+    /// More vertices than a shape of wood can mean.
+    #[error(
+        "{shape}: its curves need more than {limit} chords of {chord_mm} mm; raise chord_mm or simplify it"
+    )]
+    TooFine {
+        /// The shape.
+        shape: String,
+        /// The tolerance, mm.
+        chord_mm: f64,
+        /// Most chords of one shape.
+        limit: usize,
+    },
+    /// A path that crosses itself without end.
+    #[error(
+        "{shape}: it crosses itself more than {limit} times, so it is a scribble and no outline; simplify it"
+    )]
+    Scribble {
+        /// The shape.
+        shape: String,
+        /// Most crossings that are resolved.
+        limit: usize,
+    },
+    /// An outline that stays broken after resolving: a bug of ours if it ever happens.
+    #[error("{shape}: {fault}; simplify the path there")]
+    Unresolved {
+        /// The shape.
+        shape: String,
+        /// What is wrong, and where.
+        fault: RegionFault,
+    },
+    /// Nothing is left of a layer.
+    #[error("layer '{layer}': nothing is left of it to carve ({why})")]
+    EmptyLayer {
+        /// Name of the layer.
+        layer: String,
+        /// What became of its shapes.
+        why: String,
+    },
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,1 +1,339 @@
 //! The wood as a heightfield; removes plain moves of a cutter from it.
+//!
+//! [`Block::cut`] takes away the exact volume that flat and ball cutters sweep along straight moves of any
+//! direction, plunges and retracts included, and says for each move what it met. Rapids cut like any
+//! other move, so that one that runs into wood shows.
+
+mod sweep;
+
+use crate::cutter::Profile;
+use crate::geom::{DVec2, DVec3, Grid, Heightfield, Move};
+use crate::job::Stock;
+use rayon::prelude::*;
+use sweep::{Joint, Left, SPAN_SLACK_MM, Span, Sweep, Tip};
+
+/// What a move met.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Contact {
+    /// Largest thickness of wood removed at a node, mm; 0 = the move ran through air.
+    pub deepest_mm: f32,
+    /// Largest height of wood above the tip at a node where the move removed wood, mm: what the flutes must reach.
+    pub engaged_mm: f32,
+}
+
+impl Contact {
+    /// The larger of both, figure by figure.
+    #[must_use]
+    pub fn worst(self, other: Self) -> Self {
+        Self {
+            deepest_mm: self.deepest_mm.max(other.deepest_mm),
+            engaged_mm: self.engaged_mm.max(other.engaged_mm),
+        }
+    }
+}
+
+/// A place where something that does not cut runs into wood.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Touch {
+    /// Where, mm.
+    pub at: DVec2,
+    /// How deep, mm.
+    pub depth_mm: f64,
+}
+
+/// The wood: its top as heights at the nodes of a grid.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Block {
+    field: Heightfield,
+    top_mm: f64,
+    thickness_mm: f64,
+}
+
+/// Rows of nodes that one task carves.
+const BAND_ROWS: usize = 64;
+
+/// Widest wedge at a joint that counts as thin, nodes.
+const THIN_NODES: f64 = 2.0;
+
+/// Rapids carve with a cutter this much slimmer, mm: a retract from the end of a cut grazes nodes that lie just on
+/// the rim of the cut, and whether round-off puts them in or out must not look like a rapid through wood.
+const RAPID_SLIM_MM: f64 = 1e-5;
+
+/// Less than this removed at a node does not count as engagement, mm (rounding of the stored heights).
+const ENGAGED_FROM_MM: f64 = 1e-3;
+
+impl Block {
+    /// The uncut blank, flat at z = 0, on `grid`.
+    pub fn new(stock: &Stock, grid: Grid) -> Self {
+        Self { field: Heightfield::flat(grid, 0.0), top_mm: 0.0, thickness_mm: stock.thickness_mm }
+    }
+
+    /// A blank whose top already has a shape (a pre-machined blank, or the state after earlier work).
+    pub fn from_field(stock: &Stock, field: Heightfield) -> Self {
+        let top_mm = field.range().map_or(f64::INFINITY, |r| f64::from(r.1));
+        Self { field, top_mm, thickness_mm: stock.thickness_mm }
+    }
+
+    /// The wood's top, mm.
+    pub fn field(&self) -> &Heightfield {
+        &self.field
+    }
+
+    /// The wood's top, mm, handed over.
+    pub fn into_field(self) -> Heightfield {
+        self.field
+    }
+
+    /// Height of the underside, mm (below zero).
+    pub fn bottom_mm(&self) -> f64 {
+        -self.thickness_mm
+    }
+
+    /// Removes what `moves` sweep, in their order, and says what each met.
+    ///
+    /// Moves that go on where the one before ended are one chain: the result is the exact swept volume of the whole,
+    /// and each node is credited to the move that cuts it deepest (not to the one that came near it first).
+    /// See [`Block::cut_alone`] where the difference matters.
+    pub fn cut(&mut self, profile: &Profile, moves: &[Move]) -> Vec<Contact> {
+        self.cut_alone(profile, moves, |_| false)
+    }
+
+    /// As [`Block::cut`]; the moves that `alone` names (by index) are credited with all the wood that
+    /// they meet themselves. That is several times slower for short moves.
+    pub fn cut_alone(
+        &mut self,
+        profile: &Profile,
+        moves: &[Move],
+        alone: impl Fn(usize) -> bool + Sync,
+    ) -> Vec<Contact> {
+        let mut contacts = vec![Contact::default(); moves.len()];
+        let tip = Tip::of(profile);
+        let slim = Tip::of(&profile.slimmed(RAPID_SLIM_MM));
+        // A wedge up to a few nodes wide costs less as part of a strip than as a stamp of its own.
+        let thin_mm = THIN_NODES * self.field.grid().pitch_mm;
+        let joints: Vec<Joint> = (0..moves.len() + 1)
+            .into_par_iter()
+            .with_min_len(1024)
+            .map(|k| match (k.checked_sub(1), moves.get(k)) {
+                (Some(i), Some(next)) if !alone(i) && !alone(k) => {
+                    Joint::of(&moves[i], next, tip, thin_mm)
+                }
+                _ => Joint::None,
+            })
+            .collect();
+        let lattice = Lattice::new(*self.field.grid());
+        let top_mm = self.top_mm;
+        let bins = self.bins(tip.radius, moves);
+        let parts: Vec<Vec<(u32, Contact)>> = self
+            .field
+            .z_mut()
+            .par_chunks_mut(lattice.grid.nx * BAND_ROWS)
+            .zip(bins)
+            .enumerate()
+            .map(|(b, (z, bin))| {
+                let mut band = Band { lattice, row0: b * BAND_ROWS, z };
+                let mut met = Vec::new();
+                for k in bin {
+                    let i = k as usize;
+                    let mut contact = Contact::default();
+                    let ends = [joints[i], joints[i + 1]];
+                    let tip_here = if moves[i].is_rapid() { slim } else { tip };
+                    band.carve(&Sweep::of(&moves[i], tip_here, ends), &mut contact);
+                    if ends[1] == Joint::Wedge
+                        && moves[i].to.z < top_mm
+                        && let Some(wedge) = Sweep::wedge(&moves[i], &moves[i + 1], tip)
+                    {
+                        band.carve(&wedge, &mut contact);
+                    }
+                    if contact.deepest_mm > 0.0 {
+                        met.push((k, contact));
+                    }
+                }
+                met
+            })
+            .collect();
+        for (k, contact) in parts.into_iter().flatten() {
+            let c = &mut contacts[k as usize];
+            *c = c.worst(contact);
+        }
+        contacts
+    }
+
+    /// The moves that can touch each band of rows, in order. Moves above the wood are left out.
+    fn bins(&self, radius_mm: f64, moves: &[Move]) -> Vec<Vec<u32>> {
+        let lattice = Lattice::new(*self.field.grid());
+        let ny = lattice.grid.ny;
+        let mut bins = vec![Vec::new(); ny.div_ceil(BAND_ROWS)];
+        for (k, m) in moves.iter().enumerate() {
+            if m.from.z.min(m.to.z) >= self.top_mm {
+                continue;
+            }
+            let (lo, hi) = (m.from.y.min(m.to.y) - radius_mm, m.from.y.max(m.to.y) + radius_mm);
+            if let Some((j0, j1)) = lattice.rows(lo, hi, 0, ny) {
+                for bin in &mut bins[j0 / BAND_ROWS..=j1 / BAND_ROWS] {
+                    bin.push(k as u32);
+                }
+            }
+        }
+        bins
+    }
+
+    /// Height of the highest wood under a disc at `p`, mm: never too low, at most by what lies within a cell's
+    /// diagonal outside the disc too high. Minus infinity where there is no wood.
+    pub fn highest_under(&self, radius_mm: f64, p: DVec2) -> f64 {
+        let lattice = Lattice::new(*self.field.grid());
+        let grid = lattice.grid;
+        let r = radius_mm + grid.pitch_mm * std::f64::consts::SQRT_2;
+        let mut highest = f32::NEG_INFINITY;
+        let Some((j0, j1)) = lattice.rows(p.y - r, p.y + r, 0, grid.ny) else {
+            return f64::NEG_INFINITY;
+        };
+        for j in j0..=j1 {
+            let dy = grid.node(0, j).y - p.y;
+            let w = (r * r - dy * dy).max(0.0).sqrt();
+            if let Some((i0, i1)) = lattice.columns(p.x - w, p.x + w) {
+                for &z in &self.field.row(j)[i0..=i1] {
+                    highest = if z > highest { z } else { highest };
+                }
+            }
+        }
+        f64::from(highest)
+    }
+
+    /// The deepest place where a cylinder of `radius_mm`, standing `above_tip_mm` above the tip, runs into
+    /// the wood as it is now along one move: for shanks and collet nuts. Nothing is removed.
+    pub fn touch(&self, radius_mm: f64, above_tip_mm: f64, mv: &Move) -> Option<Touch> {
+        let lowest = mv.from.z.min(mv.to.z) + above_tip_mm;
+        if lowest >= self.top_mm {
+            return None;
+        }
+        let lattice = Lattice::new(*self.field.grid());
+        let sweep = Sweep::of(mv, Tip::of(&Profile::Flat { radius_mm }), [Joint::None; 2]);
+        let (lo, hi) = sweep.y_range();
+        let (j0, j1) = lattice.rows(lo, hi, 0, lattice.grid.ny)?;
+        let mut worst: Option<Touch> = None;
+        for j in j0..=j1 {
+            let row = self.field.row(j);
+            for_nodes(&lattice, &sweep, j, |i, left| {
+                let depth_mm = f64::from(row[i]) - (left.z + above_tip_mm);
+                if depth_mm > worst.map_or(0.0, |w| w.depth_mm) {
+                    worst = Some(Touch { at: lattice.grid.node(i, j), depth_mm });
+                }
+            });
+        }
+        worst
+    }
+}
+
+/// Some rows of the wood.
+struct Band<'a> {
+    lattice: Lattice,
+    row0: usize,
+    z: &'a mut [f32],
+}
+
+impl Band<'_> {
+    fn carve(&mut self, sweep: &Sweep, contact: &mut Contact) {
+        let nx = self.lattice.grid.nx;
+        let rows_here = self.z.len() / nx;
+        let (lo, hi) = sweep.y_range();
+        let Some((j0, j1)) = self.lattice.rows(lo, hi, self.row0, self.row0 + rows_here) else {
+            return;
+        };
+        for j in j0..=j1 {
+            let row = &mut self.z[(j - self.row0) * nx..][..nx];
+            for_nodes(&self.lattice, sweep, j, |i, left| {
+                let old = row[i];
+                let new = left.z as f32;
+                if new < old {
+                    row[i] = new;
+                    contact.deepest_mm = contact.deepest_mm.max(old - new);
+                    if f64::from(old) - left.z > ENGAGED_FROM_MM {
+                        let engaged = (f64::from(old) - left.tip) as f32;
+                        contact.engaged_mm = contact.engaged_mm.max(engaged);
+                    }
+                }
+            });
+        }
+    }
+}
+
+/// Calls `f` with the column of every node of row `j` that a sweep comes to, and what it leaves there.
+#[inline]
+fn for_nodes(lattice: &Lattice, sweep: &Sweep, j: usize, f: impl FnMut(usize, Left)) {
+    match sweep {
+        Sweep::Stamp(s) => lattice.visit(j, s.anchor(), |dy| s.spans(dy), |d| s.left(d), f),
+        Sweep::Along(a) => lattice.visit(j, a.anchor(), |dy| a.spans(dy), |d| a.left(d), f),
+    }
+}
+
+/// A grid made ready for finding nodes.
+#[derive(Debug, Clone, Copy)]
+struct Lattice {
+    grid: Grid,
+    per_mm: f64,
+}
+
+impl Lattice {
+    fn new(grid: Grid) -> Self {
+        Self { grid, per_mm: 1.0 / grid.pitch_mm }
+    }
+
+    /// First and last row in `from..to` with y in `lo..=hi`.
+    fn rows(&self, lo: f64, hi: f64, from: usize, to: usize) -> Option<(usize, usize)> {
+        let y0 = self.grid.origin.y;
+        index_range((lo - y0) * self.per_mm, (hi - y0) * self.per_mm, from, to)
+    }
+
+    /// First and last column with x in `lo..=hi`.
+    #[inline]
+    fn columns(&self, lo: f64, hi: f64) -> Option<(usize, usize)> {
+        let x0 = self.grid.origin.x;
+        index_range((lo - x0) * self.per_mm, (hi - x0) * self.per_mm, 0, self.grid.nx)
+    }
+
+    /// Calls `f` with the column of every node of row `j` in `spans` (by the row's height above the anchor), and what is
+    /// left there (by the offset from the anchor).
+    #[inline]
+    fn visit<const N: usize>(
+        &self,
+        j: usize,
+        anchor: DVec3,
+        spans: impl Fn(f64) -> [Span; N],
+        left: impl Fn(DVec2) -> Option<Left>,
+        mut f: impl FnMut(usize, Left),
+    ) {
+        let (origin, pitch) = (self.grid.origin, self.grid.pitch_mm);
+        let dy = origin.y + j as f64 * pitch - anchor.y;
+        let x0 = origin.x - anchor.x;
+        for span in spans(dy) {
+            let lo = anchor.x + span.lo - SPAN_SLACK_MM;
+            let hi = anchor.x + span.hi + SPAN_SLACK_MM;
+            if hi < lo {
+                continue;
+            }
+            let Some((i0, i1)) = self.columns(lo, hi) else { continue };
+            for i in i0..=i1 {
+                if let Some(left) = left(DVec2::new(x0 + i as f64 * pitch, dy)) {
+                    f(i, left);
+                }
+            }
+        }
+    }
+}
+
+/// The whole numbers in `lo..=hi` that are in `from..to`, as first and last.
+#[inline]
+fn index_range(lo: f64, hi: f64, from: usize, to: usize) -> Option<(usize, usize)> {
+    // Casts saturate and drop the fraction: a grid has far fewer than 2^31 rows and columns. Rounding up by
+    // hand, for ceil() is a call on plain x86-64.
+    let below = lo.max(from as f64) as i32;
+    let first = below as usize + usize::from(f64::from(below) < lo);
+    if hi < first as f64 || first >= to {
+        return None;
+    }
+    Some((first, (hi as i32 as usize).min(to - 1)))
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,14 +1,79 @@
 //! Region + layer settings -> [`Mesh`] or height field; one file per method.
+//!
+//! [`raise_all`] turns the outlines of a job into surfaces: one for each figure, in paint order. Heights
+//! are those above the layer's reference plane; what lies below, offsets and seams are the merge's work.
+//! Whatever cannot be raised as asked for is told in [`Raised::notes`], never dropped in silence.
 
-use crate::geom::DVec3;
+mod distance;
+mod inscribed;
+mod inside;
+mod mesh;
+mod profile;
 
-/// A triangle mesh, mm: z is the height above the layer's reference plane.
-#[derive(Debug, Clone, Default)]
-pub struct Mesh {
-    /// Vertices.
-    pub vertices: Vec<DVec3>,
-    /// Triangles by vertex index, counter-clockwise seen from above.
-    pub faces: Vec<[u32; 3]>,
+pub use distance::Segments;
+pub use inscribed::inscribed_radius;
+pub use inside::inside_spans;
+pub use mesh::{Mesh, MeshError};
+pub use profile::{capped_height, outline_height, profile_at, smooth_cap};
+
+use crate::geom::{Bounds, Grid};
+use crate::job::{LayerSpec, SurfaceSpec};
+use crate::outline::{Figure, Outlines};
+use rayon::prelude::*;
+
+/// A rectangular window of a grid's nodes: columns `i0..i0 + nx`, rows `j0..j0 + ny`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Window {
+    /// First column.
+    pub i0: usize,
+    /// First row.
+    pub j0: usize,
+    /// Columns.
+    pub nx: usize,
+    /// Rows.
+    pub ny: usize,
+}
+
+impl Window {
+    /// All nodes of a grid.
+    pub fn whole(grid: &Grid) -> Self {
+        Self { i0: 0, j0: 0, nx: grid.nx, ny: grid.ny }
+    }
+
+    /// The nodes whose cell (the square of one pitch round the node) meets `bounds`; empty (`nx` or
+    /// `ny` = 0) when none does.
+    pub fn around(grid: &Grid, bounds: &Bounds) -> Self {
+        let (lo, hi) = (grid.to_grid(bounds.min), grid.to_grid(bounds.max));
+        // `as usize` clamps at zero, which is what the first node is for.
+        let span = |lo: f64, hi: f64, n: usize| {
+            if !(hi >= -0.5 && lo <= n as f64 - 0.5) {
+                return (0, 0);
+            }
+            let first = (lo - 0.5).floor().max(0.0) as usize;
+            let last = ((hi + 0.5).ceil().max(0.0) as usize).min(n - 1);
+            (first, last + 1 - first)
+        };
+        let ((i0, nx), (j0, ny)) = (span(lo.x, hi.x, grid.nx), span(lo.y, hi.y, grid.ny));
+        if nx == 0 || ny == 0 { Self { i0, j0, nx: 0, ny: 0 } } else { Self { i0, j0, nx, ny } }
+    }
+
+    /// Number of nodes.
+    pub fn len(&self) -> usize {
+        self.nx * self.ny
+    }
+
+    /// True when it holds no node.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// The part of it in rows `j0..j1` of the grid.
+    #[must_use]
+    pub fn rows(&self, j0: usize, j1: usize) -> Self {
+        let first = self.j0.max(j0);
+        let end = (self.j0 + self.ny).min(j1).max(first);
+        Self { j0: first, ny: end - first, ..*self }
+    }
 }
 
 /// Heights on a rectangular window of the relief's grid.
@@ -26,6 +91,26 @@ pub struct Patch {
     pub z: Vec<f32>,
 }
 
+impl Patch {
+    /// A patch without a height anywhere.
+    pub fn empty(window: Window) -> Self {
+        let Window { i0, j0, nx, ny } = window;
+        Self { i0, j0, nx, ny, z: vec![f32::NAN; window.len()] }
+    }
+
+    /// The window it covers.
+    pub fn window(&self) -> Window {
+        Window { i0: self.i0, j0: self.j0, nx: self.nx, ny: self.ny }
+    }
+
+    /// Height at node (i, j) of the grid; NaN outside the figure or the window.
+    pub fn at(&self, i: usize, j: usize) -> f32 {
+        let inside =
+            (self.i0..self.i0 + self.nx).contains(&i) && (self.j0..self.j0 + self.ny).contains(&j);
+        if inside { self.z[(j - self.j0) * self.nx + (i - self.i0)] } else { f32::NAN }
+    }
+}
+
 /// The surface of one figure.
 #[derive(Debug, Clone)]
 pub enum Surface {
@@ -33,4 +118,259 @@ pub enum Surface {
     Mesh(Mesh),
     /// Heights at the nodes.
     Field(Patch),
+}
+
+/// Why a surface cannot be raised.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum SurfaceError {
+    /// A coordinate of an outline is NaN or infinite.
+    #[error(
+        "layer '{layer}': {figure} has a coordinate that is not a finite number; correct the path in the artwork"
+    )]
+    NotFinite {
+        /// Name of the layer.
+        layer: String,
+        /// The figure, as its source names it.
+        figure: String,
+    },
+    /// A setting of the layer is NaN, infinite or of the wrong sign.
+    #[error("layer '{layer}': {key} = {value} cannot be used; {cure}")]
+    BadSetting {
+        /// Name of the layer.
+        layer: String,
+        /// The key in the job file.
+        key: &'static str,
+        /// Its value.
+        value: f64,
+        /// What to write instead.
+        cure: &'static str,
+    },
+}
+
+/// What the user should know about one part of a figure; [`raise_all`] counts them up into notes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Remark {
+    /// Narrower than three cells at its widest place: sampled finer and averaged.
+    Narrow {
+        /// Full width at its widest place, mm.
+        width_mm: f64,
+        /// The middle of its bounding box, mm.
+        at: crate::geom::DVec2,
+    },
+    /// Narrower than one cell at its widest place: the grid cannot hold its shape.
+    TooNarrow {
+        /// Full width at its widest place, mm.
+        width_mm: f64,
+        /// The middle of its bounding box, mm.
+        at: crate::geom::DVec2,
+    },
+    /// The slope cap keeps its ridge below the height asked for.
+    Capped {
+        /// Height of its ridge, mm.
+        height_mm: f64,
+    },
+    /// The ridge was asked to lie below the outline; it lies level with it.
+    RidgeBelowBase,
+    /// It reaches past the edge of the stock and is cut off there.
+    OverTheEdge {
+        /// How far at most, mm.
+        by_mm: f64,
+    },
+}
+
+/// The surface of one figure and what there is to say about it.
+#[derive(Debug, Clone)]
+pub struct RaisedFigure {
+    /// The surface.
+    pub surface: Surface,
+    /// Remarks on its parts.
+    pub remarks: Vec<Remark>,
+}
+
+/// The surfaces of all figures and what the user should know.
+#[derive(Debug, Clone)]
+pub struct Raised {
+    /// One for each figure of each layer, in the order of the outlines.
+    pub surfaces: Vec<Vec<Surface>>,
+    /// What the user should know, by layer.
+    pub notes: Vec<String>,
+}
+
+/// Raises one figure over the grid by the method of its layer.
+///
+/// # Errors
+/// [`SurfaceError`]: an outline or a setting that is not a usable number.
+pub fn raise(
+    figure: &Figure,
+    layer: &LayerSpec,
+    grid: &Grid,
+) -> Result<RaisedFigure, SurfaceError> {
+    check_numbers(figure, layer)?;
+    let mut remarks = Vec::new();
+    let mut bounds = Bounds::EMPTY;
+    for region in &figure.regions {
+        bounds = bounds.union(&region.bounds());
+    }
+    let stage = grid.bounds();
+    let over = (stage.min - bounds.min).max(bounds.max - stage.max).max_element();
+    if over > grid.pitch_mm {
+        remarks.push(Remark::OverTheEdge { by_mm: over });
+    }
+    let surface = match layer.surface {
+        SurfaceSpec::Profile { profile, radius_mm } => {
+            let flank = profile::Flank::of(layer, profile, radius_mm);
+            Surface::Field(profile::raise(figure, &flank, grid, &mut remarks))
+        }
+    };
+    Ok(RaisedFigure { surface, remarks })
+}
+
+/// Raises every figure of every layer, in parallel; the order is that of the outlines, whatever the
+/// number of threads. `layers` are the job's, one for each layer of `outlines`.
+///
+/// # Errors
+/// The first [`SurfaceError`] in paint order.
+pub fn raise_all(
+    outlines: &Outlines,
+    layers: &[LayerSpec],
+    grid: &Grid,
+) -> Result<Raised, SurfaceError> {
+    let figures: Vec<(usize, &Figure)> = (outlines.layers.iter().enumerate().take(layers.len()))
+        .flat_map(|(l, layer)| layer.figures.iter().map(move |figure| (l, figure)))
+        .collect();
+    let raised: Vec<Result<RaisedFigure, SurfaceError>> = figures
+        .par_iter()
+        .with_max_len(1)
+        .map(|&(l, figure)| raise(figure, &layers[l], grid))
+        .collect();
+    let mut surfaces: Vec<Vec<Surface>> = layers.iter().map(|_| Vec::new()).collect();
+    let mut remarks: Vec<Vec<(&str, Remark)>> = layers.iter().map(|_| Vec::new()).collect();
+    for (&(l, figure), raised) in figures.iter().zip(raised) {
+        let raised = raised?;
+        surfaces[l].push(raised.surface);
+        remarks[l].extend(raised.remarks.into_iter().map(|r| (figure.source.as_str(), r)));
+    }
+    let mut notes = Vec::new();
+    for (layer, remarks) in layers.iter().zip(&remarks) {
+        tell(layer, remarks, grid.pitch_mm, &mut notes);
+    }
+    Ok(Raised { surfaces, notes })
+}
+
+/// Refuses numbers that no surface can be made of.
+fn check_numbers(figure: &Figure, layer: &LayerSpec) -> Result<(), SurfaceError> {
+    let mut points = figure.regions.iter().flat_map(|r| r.rings().flatten());
+    if !points.all(|p| p.is_finite()) {
+        return Err(SurfaceError::NotFinite {
+            layer: layer.name.clone(),
+            figure: figure.source.clone(),
+        });
+    }
+    let SurfaceSpec::Profile { radius_mm, .. } = layer.surface;
+    let right_angle = std::f64::consts::FRAC_PI_2;
+    let checks = [
+        ("height_mm", layer.height_mm, layer.height_mm.is_finite(), "give a finite height"),
+        ("base_mm", layer.base_mm, layer.base_mm.is_finite(), "give a finite height"),
+        ("slope_cap", layer.slope_cap, layer.slope_cap > 0.0, "give a slope above 0"),
+        (
+            "draft_deg",
+            layer.draft_rad.to_degrees(),
+            (0.0..right_angle).contains(&layer.draft_rad),
+            "give an angle from 0 to below 90 degrees",
+        ),
+        (
+            "surface.radius_mm",
+            radius_mm.unwrap_or(1.0),
+            radius_mm.is_none_or(|r| r.is_finite() && r > 0.0),
+            "give a radius above 0 or leave it out",
+        ),
+    ];
+    match checks.into_iter().find(|&(_, _, good, _)| !good) {
+        None => Ok(()),
+        Some((key, value, _, cure)) => {
+            Err(SurfaceError::BadSetting { layer: layer.name.clone(), key, value, cure })
+        }
+    }
+}
+
+/// Counts the remarks on one layer up into notes: one for each kind, with the worst case named.
+fn tell(layer: &LayerSpec, remarks: &[(&str, Remark)], pitch_mm: f64, notes: &mut Vec<String>) {
+    let name = &layer.name;
+    // (how many, worst value, which figure, where)
+    let mut too_narrow: Option<(usize, f64, &str, crate::geom::DVec2)> = None;
+    let mut narrow = too_narrow;
+    let mut capped: Option<(usize, f64, &str)> = None;
+    let mut over: Option<(usize, f64, &str)> = None;
+    let mut below_base = false;
+    for &(source, remark) in remarks {
+        match remark {
+            Remark::Narrow { width_mm, at } | Remark::TooNarrow { width_mm, at } => {
+                let slot = if matches!(remark, Remark::Narrow { .. }) {
+                    &mut narrow
+                } else {
+                    &mut too_narrow
+                };
+                let seen = slot.get_or_insert((0, f64::INFINITY, source, at));
+                seen.0 += 1;
+                if width_mm < seen.1 {
+                    (seen.1, seen.2, seen.3) = (width_mm, source, at);
+                }
+            }
+            Remark::Capped { height_mm } => {
+                let seen = capped.get_or_insert((0, f64::INFINITY, source));
+                seen.0 += 1;
+                if height_mm < seen.1 {
+                    (seen.1, seen.2) = (height_mm, source);
+                }
+            }
+            Remark::OverTheEdge { by_mm } => {
+                let seen = over.get_or_insert((0, 0.0, source));
+                seen.0 += 1;
+                if by_mm > seen.1 {
+                    (seen.1, seen.2) = (by_mm, source);
+                }
+            }
+            Remark::RidgeBelowBase => below_base = true,
+        }
+    }
+    if let Some((n, width, source, at)) = too_narrow {
+        notes.push(format!(
+            "layer '{name}': {n} part(s) are narrower than one cell of the grid and cannot be carved true to \
+             shape; the thinnest is {width:.3} mm wide ({source}, at {:.1}, {:.1}); set relief.pitch_mm below \
+             {:.3} (now {pitch_mm}) or widen the artwork",
+            at.x,
+            at.y,
+            width / 3.0
+        ));
+    }
+    if let Some((n, width, source, at)) = narrow {
+        notes.push(format!(
+            "layer '{name}': {n} part(s) are narrower than three cells of the grid; their heights are averages; \
+             the thinnest is {width:.3} mm wide ({source}, at {:.1}, {:.1}); a relief.pitch_mm below {:.3} (now \
+             {pitch_mm}) shows them in full",
+            at.x,
+            at.y,
+            width / 3.0
+        ));
+    }
+    if let Some((n, height, source)) = capped {
+        notes.push(format!(
+            "layer '{name}': slope_cap = {} keeps the ridge of {n} narrow part(s) below height_mm = {}; the \
+             lowest rises to {height:.2} mm ({source})",
+            layer.slope_cap, layer.height_mm
+        ));
+    }
+    if let Some((n, by, source)) = over {
+        notes.push(format!(
+            "layer '{name}': {n} figure(s) reach past the edge of the stock, by up to {by:.2} mm ({source}); \
+             they are cut off there"
+        ));
+    }
+    if below_base {
+        notes.push(format!(
+            "layer '{name}': height_mm = {} lies below base_mm = {}; the layer is flat at base_mm",
+            layer.height_mm, layer.base_mm
+        ));
+    }
 }

@@ -43,8 +43,10 @@ pub fn contains_even_odd<'a>(rings: impl IntoIterator<Item = &'a [DVec2]>, p: DV
             if (a.y <= p.y) == (b.y <= p.y) {
                 continue;
             }
-            let left = orient(a, b, p) > 0.0;
-            if left == (b.y > a.y) {
+            // Of the edge turned upwards, only points strictly to its left count; whichever way the
+            // edge runs, a point on it is on the same side of it.
+            let (low, high) = if a.y < b.y { (a, b) } else { (b, a) };
+            if orient(low, high, p) > 0.0 {
                 inside = !inside;
             }
         }
@@ -88,7 +90,7 @@ mod tests {
         let b = DVec2::new(12.0, 12.0);
         let c = DVec2::new(24.0, 24.0);
         assert_eq!(orient(a, b, c), 0.0);
-        assert!(orient(DVec2::new(0.5, 0.5 + f64::EPSILON), b, c) < 0.0);
+        assert!(orient(DVec2::new(0.5, 0.5 + f64::EPSILON), b, c) > 0.0);
     }
 
     #[test]

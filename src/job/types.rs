@@ -29,6 +29,41 @@ pub struct Job {
     pub ramp_rad: f64,
     /// When true, leftover above scallop + gouge where a cutter reaches fails the proof.
     pub strict: bool,
+    /// How many mm one unit of the artwork file becomes.
+    pub artwork_unit_mm: f64,
+    /// Lower left corner of the placed artwork's bounding box, in work coordinates, mm.
+    pub artwork_lower_left_mm: DVec2,
+    /// Size of the placed artwork's bounding box, mm.
+    pub artwork_size_mm: DVec2,
+    /// What was decided for the user and what looks odd, in plain sentences.
+    pub notes: Vec<String>,
+}
+
+/// What the artwork holds, as far as the job needs to know; in units of the file.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Found {
+    /// Size of the box around all shapes that can be carved, file units.
+    pub size: DVec2,
+    /// Millimetres a unit of the file, when the file gives physical sizes; `None` for pixel art.
+    pub unit_mm: Option<f64>,
+    /// The layers that a job without `[[layer]]` gets: paint order, lowest first, one per fill colour
+    /// and per stroke colour.
+    pub layers: Vec<FoundLayer>,
+    /// Every selector that takes at least one shape ([`Selector::All`] aside).
+    pub selectors: Vec<Selector>,
+}
+
+/// One layer found in the artwork.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FoundLayer {
+    /// What takes its shapes.
+    pub select: Selector,
+    /// Its name; empty = named after its colour.
+    pub name: String,
+    /// Area of its shapes, square file units.
+    pub area: f64,
+    /// Size of the box around its shapes, file units.
+    pub size: DVec2,
 }
 
 /// The router: what it can do, as its GRBL settings say.
@@ -107,6 +142,17 @@ impl Origin {
             Self::UpperLeft => DVec2::Y,
             Self::UpperRight => DVec2::ONE,
             Self::Center => DVec2::splat(0.5),
+        }
+    }
+
+    /// The place in words: `lower left corner`.
+    pub fn words(self) -> &'static str {
+        match self {
+            Self::LowerLeft => "lower left corner",
+            Self::LowerRight => "lower right corner",
+            Self::UpperLeft => "upper left corner",
+            Self::UpperRight => "upper right corner",
+            Self::Center => "center",
         }
     }
 }

@@ -1,0 +1,103 @@
+//! The command line: one file per command; the only place with files, clock, terminal, fonts, ports.
+
+mod carve;
+mod check;
+mod files;
+mod inputs;
+mod lists;
+mod new;
+mod observe;
+mod outcome;
+
+use clap::{Parser, Subcommand};
+use std::process::ExitCode;
+
+/// Exit code for bad input.
+const BAD_INPUT: u8 = 1;
+/// Exit code when a check failed: gouge, envelope, rapid through stock.
+const CHECK_FAILED: u8 = 4;
+/// Exit code after Ctrl-C.
+const INTERRUPTED: u8 = 130;
+
+/// Turns layered artwork into a wood carving: relief, toolpaths, proved G-code.
+#[derive(Debug, Parser)]
+#[command(name = "relievo", version, about, arg_required_else_help = true)]
+struct Cli {
+    /// Worker threads (default: one a core); the result is the same bytes with any number.
+    #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    threads: Option<u16>,
+
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Carve artwork: relief, toolpaths, proved G-code and pictures
+    Carve(carve::Args),
+    /// Read and check a job file; write nothing
+    Check(check::Args),
+    /// Write a commented job file for artwork, one layer for each colour found
+    New(new::Args),
+    /// List every setting of a job file with its default
+    Defaults,
+    /// List the machines
+    Machines(lists::Args),
+    /// List the cutters
+    Cutters(lists::Args),
+    /// List the woods
+    Woods(lists::Args),
+}
+
+/// Why a command ends without success.
+#[derive(Debug)]
+enum Stop {
+    /// Bad input, or a disk that refuses: exit code 1.
+    Refused(anyhow::Error),
+    /// A check of the finished programs failed: exit code 4.
+    CheckFailed(String),
+}
+
+impl<E: Into<anyhow::Error>> From<E> for Stop {
+    fn from(e: E) -> Self {
+        Self::Refused(e.into())
+    }
+}
+
+/// Runs the command that the arguments ask for.
+pub fn main() -> ExitCode {
+    let cli = Cli::parse();
+    if let Some(n) = cli.threads {
+        // Fails only when a pool exists already, and nothing has used one yet.
+        let _ = rayon::ThreadPoolBuilder::new().num_threads(usize::from(n)).build_global();
+    }
+    let done = match cli.command {
+        Command::Carve(args) => carve::run(&args),
+        Command::Check(args) => check::run(&args),
+        Command::New(args) => new::run(&args),
+        Command::Defaults => lists::defaults(),
+        Command::Machines(args) => lists::machines(&args),
+        Command::Cutters(args) => lists::cutters(&args),
+        Command::Woods(args) => lists::woods(&args),
+    };
+    match done {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(Stop::Refused(e)) if is_broken_pipe(&e) => ExitCode::SUCCESS,
+        Err(Stop::Refused(e)) => {
+            let text = format!("{e:#}");
+            // The pictures of job faults bring their own heading.
+            let heading = if text.starts_with("error") { "" } else { "error: " };
+            observe::complain(&format!("{heading}{text}"));
+            ExitCode::from(BAD_INPUT)
+        }
+        Err(Stop::CheckFailed(text)) => {
+            observe::complain(&text);
+            ExitCode::from(CHECK_FAILED)
+        }
+    }
+}
+
+/// `relievo machines | head` closes the pipe early; that is no fault.
+fn is_broken_pipe(e: &anyhow::Error) -> bool {
+    e.downcast_ref::<std::io::Error>().is_some_and(|e| e.kind() == std::io::ErrorKind::BrokenPipe)
+}

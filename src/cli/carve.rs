@@ -1,0 +1,71 @@
+//! `relievo carve`: the whole job, from artwork to proved programs and pictures.
+
+use super::files::{self, Outputs};
+use super::observe::{self, Stages};
+use super::{Stop, inputs, outcome};
+use crate::carve;
+use std::path::{Path, PathBuf};
+
+#[derive(Debug, clap::Args)]
+#[command(
+    after_help = "Examples:\n  relievo carve rose.svg                 good defaults, outputs in rose-carving/\n  \
+                        relievo carve rose.toml --timings      a job file, and how long each stage took"
+)]
+pub(super) struct Args {
+    /// A job file (.toml) or artwork (.svg, .svgz)
+    pub(super) input: PathBuf,
+
+    /// Folder for the outputs (default: NAME-carving beside the input)
+    #[arg(long, value_name = "FOLDER")]
+    out: Option<PathBuf>,
+
+    /// Print how long each stage took
+    #[arg(long)]
+    timings: bool,
+
+    /// Print the result as JSON
+    #[arg(long)]
+    json: bool,
+
+    /// Print nothing when all goes well
+    #[arg(long)]
+    quiet: bool,
+}
+
+pub(super) fn run(args: &Args) -> Result<(), Stop> {
+    let stages = Stages::new(args.quiet);
+    stages.enter("read");
+    let input = inputs::load(&args.input)?;
+    let folder = args.out.clone().unwrap_or_else(|| default_folder(&args.input));
+    let mut outputs = Outputs::prepare(&folder)?;
+    let carving = carve(input.draft, &input.artwork, &mut |stage| stages.enter(stage))
+        .map_err(|e| outcome::with_file(e, &input.artwork_file))?;
+    if !carving.verdict.passed() {
+        return Err(Stop::CheckFailed(outcome::failure(&carving)));
+    }
+    stages.enter("pictures");
+    let again = files::name_from(&folder, &input.artwork_file)?;
+    let (data, made) = outcome::outputs(&carving, &again)?;
+    stages.enter("write");
+    for (name, bytes) in &made {
+        outputs.add(name, bytes)?;
+    }
+    outputs.commit()?;
+    let timings = stages.finish();
+    if args.json {
+        observe::say(&outcome::json(&carving, &folder)?)?;
+    } else if !args.quiet {
+        observe::say(&crate::report::summary(&data))?;
+        observe::say(&format!("written to {}", folder.display()))?;
+    }
+    if args.timings {
+        observe::complain(&timings);
+    }
+    Ok(())
+}
+
+/// `dir/rose.svg` -> `dir/rose-carving`.
+fn default_folder(input: &Path) -> PathBuf {
+    let stem = input.file_stem().unwrap_or_default().to_string_lossy();
+    input.with_file_name(format!("{stem}-carving"))
+}

@@ -1,0 +1,216 @@
+//! Reading inputs and writing outputs. Outputs of one run appear together or not at all.
+
+use super::{INTERRUPTED, observe};
+use anyhow::{Context, Result, bail};
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// Largest input file taken on, bytes.
+const LARGEST_INPUT: u64 = 512 << 20;
+
+/// Reads a whole input file.
+pub(super) fn read(path: &Path) -> Result<Vec<u8>> {
+    let meta = fs::metadata(path).with_context(|| format!("cannot read {}", path.display()))?;
+    if meta.is_dir() {
+        bail!("{} is a folder; give a file", path.display());
+    }
+    if meta.len() > LARGEST_INPUT {
+        bail!(
+            "{} has {} MiB, more than the {} MiB that are read; simplify it",
+            path.display(),
+            meta.len() >> 20,
+            LARGEST_INPUT >> 20
+        );
+    }
+    fs::read(path).with_context(|| format!("cannot read {}", path.display()))
+}
+
+/// Reads a whole text file.
+pub(super) fn read_text(path: &Path) -> Result<String> {
+    let bytes = read(path)?;
+    match String::from_utf8(bytes) {
+        Ok(text) => Ok(text),
+        Err(e) => {
+            let upto = e.utf8_error().valid_up_to();
+            let line = e.as_bytes()[..upto].iter().filter(|b| **b == b'\n').count() + 1;
+            bail!("{}:{line}: not UTF-8 text; save the file as UTF-8", path.display())
+        }
+    }
+}
+
+/// How a job file in `folder` names `file`: by a relative path where there is one, with `/` between.
+pub(super) fn name_from(folder: &Path, file: &Path) -> Result<String> {
+    let full = |p: &Path| {
+        fs::canonicalize(p).with_context(|| format!("cannot find {} again", p.display()))
+    };
+    let (folder, file) = (full(folder)?, full(file)?);
+    let common = folder.components().zip(file.components()).take_while(|(a, b)| a == b).count();
+    if common == 0 {
+        return Ok(file.display().to_string()); // another drive
+    }
+    let up = folder.components().skip(common).map(|_| "..".to_string());
+    let down = file.components().skip(common).map(|c| c.as_os_str().to_string_lossy().into_owned());
+    Ok(up.chain(down).collect::<Vec<_>>().join("/"))
+}
+
+/// The files of one run, gathered in a folder inside their destination and moved in at the end.
+#[derive(Debug)]
+pub(super) struct Outputs {
+    folder: PathBuf,
+    names: Vec<String>,
+    staging: Arc<Mutex<Staging>>,
+}
+
+/// What has to go when the run ends early: by an error, or by a signal on another thread.
+#[derive(Debug)]
+struct Staging {
+    path: PathBuf,
+    /// The folders that this run made, innermost first.
+    made: Vec<PathBuf>,
+}
+
+impl Staging {
+    fn remove(&self) {
+        fs::remove_dir_all(&self.path).ok();
+        for folder in &self.made {
+            fs::remove_dir(folder).ok(); // only when empty
+        }
+    }
+}
+
+impl Outputs {
+    /// Prepares `folder` (made when missing); fails when it cannot be written. From here on Ctrl-C,
+    /// SIGTERM and SIGHUP take away what was begun and end the process with exit code 130.
+    pub(super) fn prepare(folder: &Path) -> Result<Self> {
+        let missing = |p: &&Path| !p.as_os_str().is_empty() && !p.exists();
+        let made = folder.ancestors().take_while(missing).map(Path::to_path_buf).collect();
+        let cure =
+            || format!("cannot write into {}; choose another folder with --out", folder.display());
+        let path = folder.join(format!(".relievo-{}", std::process::id()));
+        let staging = Arc::new(Mutex::new(Staging { path: path.clone(), made }));
+        let outputs = Self { folder: folder.to_path_buf(), names: Vec::new(), staging };
+        fs::create_dir_all(&path).with_context(cure)?;
+        let for_signals = Arc::clone(&outputs.staging);
+        // Fails only when a handler is set already: then the first run of this process has set it.
+        let _ = ctrlc::set_handler(move || {
+            // Waits while files are being moved in: that is never cut short.
+            let staging = for_signals.lock().unwrap_or_else(PoisonError::into_inner);
+            staging.remove();
+            observe::complain("interrupted: nothing was written");
+            std::process::exit(i32::from(INTERRUPTED));
+        });
+        Ok(outputs)
+    }
+
+    /// Adds one file.
+    pub(super) fn add(&mut self, name: &str, bytes: &[u8]) -> Result<()> {
+        use std::io::Write;
+        let path = self.staged(name);
+        let write = || -> std::io::Result<()> {
+            let mut file = fs::File::create(&path)?;
+            file.write_all(bytes)?;
+            file.sync_all()
+        };
+        write().with_context(|| format!("cannot write {name} into {}", self.folder.display()))?;
+        self.names.push(name.to_string());
+        Ok(())
+    }
+
+    /// Moves all files in and takes away programs of an earlier run that this one did not make, so that
+    /// the folder never holds programs of two different jobs.
+    pub(super) fn commit(self) -> Result<()> {
+        let staging = Arc::clone(&self.staging);
+        let held = staging.lock().unwrap_or_else(PoisonError::into_inner); // signals wait
+        let done = self.move_in(&held.path);
+        drop(held);
+        done
+    }
+
+    fn move_in(&self, staged: &Path) -> Result<()> {
+        for name in &self.names {
+            let to = self.folder.join(name);
+            if to.is_dir() {
+                bail!("{} is a folder; move it away", to.display());
+            }
+        }
+        for stale in self.programs_of_earlier_runs()? {
+            fs::remove_file(&stale)
+                .with_context(|| format!("cannot remove the old program {}", stale.display()))?;
+        }
+        for name in &self.names {
+            let to = self.folder.join(name);
+            fs::rename(staged.join(name), &to)
+                .with_context(|| format!("cannot write {}", to.display()))?;
+        }
+        Ok(())
+    }
+
+    fn staged(&self, name: &str) -> PathBuf {
+        self.staging.lock().unwrap_or_else(PoisonError::into_inner).path.join(name)
+    }
+
+    fn programs_of_earlier_runs(&self) -> Result<Vec<PathBuf>> {
+        let mut stale = Vec::new();
+        for entry in fs::read_dir(&self.folder)
+            .with_context(|| format!("cannot list {}", self.folder.display()))?
+        {
+            let path = entry?.path();
+            let name = path.file_name().and_then(|n| n.to_str()).unwrap_or_default();
+            let ours = path.extension().is_some_and(|e| e == "nc")
+                && name.starts_with(|c: char| c.is_ascii_digit())
+                && starts_with_our_header(&path);
+            if ours && !self.names.iter().any(|n| n == name) {
+                stale.push(path);
+            }
+        }
+        stale.sort();
+        Ok(stale)
+    }
+}
+
+fn starts_with_our_header(path: &Path) -> bool {
+    use std::io::Read;
+    let mut head = [0; 9];
+    fs::File::open(path).and_then(|mut f| f.read_exact(&mut head)).is_ok() && &head == b"(relievo "
+}
+
+impl Drop for Outputs {
+    fn drop(&mut self) {
+        // After a commit the staging folder is empty and the destination is not.
+        self.staging.lock().unwrap_or_else(PoisonError::into_inner).remove();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn outputs_that_are_not_committed_leave_nothing() {
+        let dir = tempfile::tempdir().unwrap();
+        let folder = dir.path().join("out");
+        let mut out = Outputs::prepare(&folder).unwrap();
+        out.add("a.txt", b"a").unwrap();
+        drop(out);
+        assert!(!folder.exists());
+    }
+
+    #[test]
+    fn programs_of_an_earlier_run_go_and_foreign_files_stay() {
+        let dir = tempfile::tempdir().unwrap();
+        let write = |n: &str, t: &str| fs::write(dir.path().join(n), t).unwrap();
+        write("3-old.nc", "(relievo 0.1.0)\nG21\n");
+        write("4-mine.nc", "(by hand)\nG21\n");
+        write("notes.txt", "keep");
+        let mut out = Outputs::prepare(dir.path()).unwrap();
+        out.add("1-new.nc", b"(relievo 0.1.0)\n").unwrap();
+        out.commit().unwrap();
+        let mut names: Vec<_> = fs::read_dir(dir.path())
+            .unwrap()
+            .map(|e| e.unwrap().file_name().into_string().unwrap())
+            .collect();
+        names.sort();
+        assert_eq!(names, ["1-new.nc", "4-mine.nc", "notes.txt"]);
+    }
+}

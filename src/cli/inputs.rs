@@ -1,0 +1,85 @@
+//! A job file or bare artwork on the disk -> a checked draft and its artwork.
+
+use super::files;
+use crate::artwork::{Artwork, Fonts, read_svg};
+use crate::job::{Draft, Library};
+use anyhow::{Context, Result, bail};
+use std::path::{Path, PathBuf};
+
+/// All that a command reads.
+#[derive(Debug)]
+pub(super) struct Input {
+    pub(super) draft: Draft,
+    pub(super) artwork: Artwork,
+    /// The artwork's file, for messages.
+    pub(super) artwork_file: PathBuf,
+    pub(super) library: Library,
+}
+
+/// Reads a job file (`.toml`) or artwork (`.svg`, `.svgz`) and, for a job, the artwork it names.
+pub(super) fn load(path: &Path) -> Result<Input> {
+    let beside = path.parent().unwrap_or(Path::new(""));
+    let library = library(beside)?;
+    let extension =
+        path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
+    let (draft, artwork_file) = match extension.as_str() {
+        "toml" => {
+            let text = files::read_text(path)?;
+            let load = |name: &str| std::fs::read_to_string(beside.join(name));
+            let draft = Draft::from_toml(&text, &path.display().to_string(), &library, &load)?;
+            let file = beside.join(&draft.artwork().file);
+            (draft, file)
+        }
+        "svg" | "svgz" => {
+            let name = path.file_name().unwrap_or_default().to_string_lossy();
+            (Draft::for_artwork(&name, &library), path.to_path_buf())
+        }
+        "" => {
+            bail!("{} has no extension; give a job file (.toml) or artwork (.svg)", path.display())
+        }
+        other => bail!(
+            "{}: '.{other}' files are not read; give a job file (.toml) or artwork (.svg, .svgz)",
+            path.display()
+        ),
+    };
+    let artwork = read_artwork(&artwork_file, &draft.artwork().font_dirs, beside)?;
+    Ok(Input { draft, artwork, artwork_file, library })
+}
+
+/// The built-in tables, overridden by `machines/*.toml` in `folder`.
+pub(super) fn library(folder: &Path) -> Result<Library> {
+    let mut library = Library::built_in();
+    let Ok(entries) = std::fs::read_dir(folder.join("machines")) else { return Ok(library) };
+    let mut paths: Vec<_> = entries.filter_map(|e| e.ok().map(|e| e.path())).collect();
+    paths.sort();
+    for path in paths.iter().filter(|p| p.extension().is_some_and(|e| e == "toml")) {
+        library.overlay(&path.display().to_string(), &files::read_text(path)?)?;
+    }
+    Ok(library)
+}
+
+fn read_artwork(path: &Path, font_dirs: &[String], beside: &Path) -> Result<Artwork> {
+    let bytes = files::read(path)?;
+    let fonts = if needs_fonts(&bytes) { load_fonts(font_dirs, beside)? } else { Fonts::none() };
+    read_svg(&bytes, &fonts).with_context(|| path.display().to_string())
+}
+
+/// Scanning the system's fonts takes long: it is done only for artwork that may hold text.
+fn needs_fonts(bytes: &[u8]) -> bool {
+    bytes.starts_with(&[0x1f, 0x8b]) || bytes.windows(4).any(|w| w == b"text")
+}
+
+fn load_fonts(dirs: &[String], beside: &Path) -> Result<Fonts> {
+    let mut database = usvg::fontdb::Database::new();
+    if dirs.is_empty() {
+        database.load_system_fonts();
+    }
+    for dir in dirs {
+        let dir = beside.join(dir);
+        if !dir.is_dir() {
+            bail!("font folder {} is not there; correct artwork.font_dirs", dir.display());
+        }
+        database.load_fonts_dir(&dir);
+    }
+    Ok(Fonts::from_database(database))
+}

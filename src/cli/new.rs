@@ -1,0 +1,59 @@
+//! `relievo new ART.svg`: a commented job file, one layer for each colour found, ready to edit.
+
+use super::{Stop, inputs, observe};
+use crate::job;
+use anyhow::{Context, anyhow};
+use std::path::PathBuf;
+
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Example:\n  relievo new rose.svg        writes rose.toml")]
+pub(super) struct Args {
+    /// The artwork (.svg, .svgz)
+    artwork: PathBuf,
+
+    /// Where to write (default: beside the artwork, ART.toml)
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+
+    /// Say nothing when it works
+    #[arg(long)]
+    quiet: bool,
+}
+
+pub(super) fn run(args: &Args) -> Result<(), Stop> {
+    if args.artwork.extension().is_some_and(|e| e == "toml") {
+        return Err(anyhow!(
+            "{} is a job file already; give artwork (.svg)",
+            args.artwork.display()
+        )
+        .into());
+    }
+    let out = args.out.clone().unwrap_or_else(|| args.artwork.with_extension("toml"));
+    let input = inputs::load(&args.artwork)?;
+    let name = args.artwork.file_name().unwrap_or_default().to_string_lossy();
+    let text = job::template(&name, &input.artwork.found(), &input.library)?;
+    write_new(&out, &text)?;
+    if !args.quiet {
+        observe::say(&format!(
+            "{} written; edit it, then: relievo carve {}",
+            out.display(),
+            out.display()
+        ))?;
+    }
+    Ok(())
+}
+
+/// Writes a file that must not be there yet.
+fn write_new(path: &std::path::Path, text: &str) -> anyhow::Result<()> {
+    use std::io::Write;
+    let mut file = match std::fs::File::create_new(path) {
+        Err(e) if e.kind() == std::io::ErrorKind::AlreadyExists => {
+            return Err(anyhow!(
+                "{} is there already; choose another name with --out",
+                path.display()
+            ));
+        }
+        file => file.with_context(|| format!("cannot write {}", path.display()))?,
+    };
+    file.write_all(text.as_bytes()).with_context(|| format!("cannot write {}", path.display()))
+}

@@ -1,0 +1,259 @@
+//! What a carving run hands over: files, report data, JSON, and the words for a run that stops.
+
+use super::Stop;
+use crate::CarveError;
+use crate::Carving;
+use crate::job::{CutterShape, Job, SurfaceSpec};
+use crate::proof::{FailureKind, Quantiles};
+use crate::report::{
+    self, Check, CutterRow, DeviationScale, LayerRow, LeftoverRow, Look, Picture, ProgramRow,
+    ReportData, ReportError, StockFacts,
+};
+use rayon::prelude::*;
+use std::path::Path;
+
+/// A file of the run: name and bytes.
+pub(super) type Made = (String, Vec<u8>);
+
+/// An error of the artwork or its outlines names the file; all others name their place themselves.
+pub(super) fn with_file(error: CarveError, artwork: &Path) -> Stop {
+    let of_artwork = matches!(error, CarveError::Artwork(_) | CarveError::Outline(_));
+    let error = anyhow::Error::from(error);
+    if of_artwork { error.context(artwork.display().to_string()).into() } else { error.into() }
+}
+
+/// What a failed proof says.
+pub(super) fn failure(carving: &Carving) -> String {
+    let mut text = String::from("error: the proof failed; no file was written");
+    for f in &carving.verdict.failures {
+        text += &format!("\n  {f}");
+    }
+    text
+}
+
+/// All files of the run, and the data of its report. `artwork` is how a job file beside them names the artwork.
+pub(super) fn outputs(
+    carving: &Carving,
+    artwork: &str,
+) -> Result<(ReportData, Vec<Made>), ReportError> {
+    let design = &carving.design;
+    let (job, target) = (&design.job, &design.relief.target);
+    let verdict = &carving.verdict;
+    let wood = Look::of_wood(&job.stock.wood.name, job.stock.grain_rad);
+    let paths: Vec<_> = carving
+        .programs
+        .iter()
+        .zip(&carving.paths)
+        .map(|(p, path)| (p.name.as_str(), path.moves.as_slice()))
+        .collect();
+    let limits =
+        DeviationScale { gouge_mm: job.tolerance.gouge_mm, scallop_mm: job.tolerance.scallop_mm };
+    let title = |what: &str| format!("{} - {what}", job.title);
+    let jobs: [(&str, &(dyn Fn() -> Result<Vec<u8>, ReportError> + Sync)); 6] = [
+        ("relief.png", &|| report::shaded_png(target, Look::Plaster, Some(&title("relief")))),
+        ("carved.png", &|| report::shaded_png(&verdict.carved, wood, Some(&title("as carved")))),
+        ("deviation.png", &|| {
+            let title = title("deviation of the dry run");
+            report::deviation_png(&verdict.deviation, &verdict.carved, limits, &title)
+        }),
+        ("paths.png", &|| report::paths_png(&paths, &job.stock, &title("toolpaths"))),
+        ("depth.png", &|| report::depth_png(target)),
+        ("relief.stl", &|| {
+            let base = -job.stock.thickness_mm;
+            report::stl(target, base, report::stl_every_nth_node(target.grid()))
+        }),
+    ];
+    let mut files: Vec<Made> = jobs
+        .par_iter()
+        .map(|(name, make)| Ok(((*name).to_string(), make()?)))
+        .collect::<Result<_, ReportError>>()?;
+    let mut data = report_data(carving);
+    let picture = |name: &str, title: &str, caption: &str| Picture {
+        title: title.into(),
+        caption: caption.into(),
+        png: files.iter().find(|f| f.0 == name).map(|f| f.1.clone()).unwrap_or_default(),
+    };
+    data.pictures = vec![
+        picture("carved.png", "As carved", "What the dry run of the programs leaves."),
+        picture("relief.png", "Design", "The relief that the programs are held against."),
+        picture(
+            "deviation.png",
+            "Deviation",
+            "Blue: wood left above the design. Red: cut below it.",
+        ),
+        picture("paths.png", "Toolpaths", "Feed moves by depth; rapids light."),
+    ];
+    files.push(("report.html".into(), report::html(&data).into_bytes()));
+    let mut again = job.clone();
+    again.artwork.file = artwork.to_string();
+    files.push(("job.toml".into(), again.to_toml().into_bytes()));
+    files.extend(carving.programs.iter().map(|p| (p.name.clone(), p.text.clone().into_bytes())));
+    Ok((data, files))
+}
+
+fn report_data(carving: &Carving) -> ReportData {
+    let design = &carving.design;
+    let job = &design.job;
+    let verdict = &carving.verdict;
+    let lowest = design.relief.target.range().map_or(0.0, |(low, _)| f64::from(low));
+    let leftover = |place: &str, q: &Quantiles| LeftoverRow {
+        place: place.into(),
+        p50_mm: q.p50_mm,
+        p90_mm: q.p90_mm,
+        p99_mm: q.p99_mm,
+        max_mm: q.max_mm,
+    };
+    ReportData {
+        title: job.title.clone(),
+        artwork: job.artwork.file.clone(),
+        machine: job.machine.title.clone(),
+        stock: StockFacts {
+            width_mm: job.stock.width_mm,
+            height_mm: job.stock.height_mm,
+            thickness_mm: job.stock.thickness_mm,
+            wood: job.stock.wood.title.clone(),
+            grain_deg: job.stock.grain_rad.to_degrees(),
+            zero: format!("{}, top of the stock", job.stock.origin.words()),
+            relief_depth_mm: -lowest,
+            pitch_mm: job.relief.pitch_mm,
+        },
+        layers: layers(carving),
+        cutters: cutters(job),
+        programs: carving
+            .paths
+            .iter()
+            .zip(&verdict.programs)
+            .map(|(path, p)| ProgramRow {
+                file: p.name.clone(),
+                cutter: path.cutter.name.clone(),
+                spindle_rpm: path.spindle_rpm,
+                feed_mm_per_min: job
+                    .operations
+                    .iter()
+                    .filter(|o| o.cutter == path.cutter)
+                    .map(|o| o.feed_mm_per_min)
+                    .fold(0.0, f64::max),
+                lines: p.lines as usize,
+                cutting_mm: p.cutting_mm,
+                deepest_mm: p.lowest_mm,
+                time_s: p.seconds,
+            })
+            .collect(),
+        passed: verdict.passed(),
+        checks: checks(carving),
+        leftover: vec![
+            leftover("everywhere", &verdict.leftover.all),
+            leftover("where the cutters reach", &verdict.leftover.reachable),
+            leftover("where only a smaller cutter would", &verdict.leftover.unreachable),
+        ],
+        notes: carving.notes.clone(),
+        pictures: Vec::new(),
+    }
+}
+
+fn layers(carving: &Carving) -> Vec<LayerRow> {
+    let design = &carving.design;
+    let rows = design.job.layers.iter().zip(&design.outlines.layers);
+    rows.map(|(spec, outlines)| LayerRow {
+        name: spec.name.clone(),
+        select: spec.select.to_string(),
+        surface: match spec.surface {
+            SurfaceSpec::Profile { profile, .. } => {
+                format!("profile, {}", format!("{profile:?}").to_lowercase())
+            }
+        },
+        combine: format!("{:?}", spec.combine).to_lowercase(),
+        figures: outlines.figures.len(),
+        base_mm: spec.base_mm,
+        height_mm: spec.height_mm,
+    })
+    .collect()
+}
+
+fn cutters(job: &Job) -> Vec<CutterRow> {
+    let mut rows: Vec<CutterRow> = Vec::new();
+    for cutter in job.operations.iter().map(|o| &o.cutter) {
+        if rows.iter().any(|r| r.name == cutter.name) {
+            continue;
+        }
+        rows.push(CutterRow {
+            name: cutter.name.clone(),
+            shape: match cutter.shape {
+                CutterShape::Flat => "flat end".into(),
+                CutterShape::Ball => "ball nose".into(),
+            },
+            diameter_mm: cutter.diameter_mm,
+            flutes: cutter.flutes,
+            flute_mm: cutter.flute_mm,
+            stickout_mm: cutter.stickout_mm,
+        });
+    }
+    rows
+}
+
+/// What was checked and what was found, one line each.
+fn checks(carving: &Carving) -> Vec<Check> {
+    use FailureKind as K;
+    let job = &carving.design.job;
+    let verdict = &carving.verdict;
+    let gouge = verdict.gouge.as_ref();
+    let deepest = gouge.map_or("none".to_string(), |g| {
+        format!("deepest {:.4} mm at X{:.2} Y{:.2}", g.depth_mm, g.at.x, g.at.y)
+    });
+    let flute = verdict.programs.iter().map(|p| p.engaged_mm).fold(0.0, f64::max);
+    let over = format!(
+        "{:.3} % of the area, at most {:.3} mm",
+        verdict.leftover.over_fraction * 100.0,
+        verdict.leftover.over_max_mm
+    );
+    let limit = job.tolerance.scallop_mm + job.tolerance.gouge_mm;
+    let mut rows = vec![
+        (format!("no gouge deeper than {} mm", job.tolerance.gouge_mm), vec![K::Gouge], deepest),
+        ("no rapid in wood".into(), vec![K::RapidInWood, K::BlindStart], "none".into()),
+        ("no plunge in wood faster than its limit".into(), vec![K::Plunge], "none".into()),
+        (
+            "flutes, shank and collet clear of wood".into(),
+            vec![K::Flute, K::Shank, K::Holder],
+            format!("deepest cut {flute:.2} mm"),
+        ),
+        ("inside the machine's travel".into(), vec![K::Travel, K::ThroughBottom], "inside".into()),
+        (
+            "feeds and spindle within limits".into(),
+            vec![K::Feed, K::SpindleSpeed, K::SpindleOff, K::NoDwell, K::NoEnd],
+            "within".into(),
+        ),
+        ("second oracle agrees".into(), vec![K::Oracles], "agrees".into()),
+    ];
+    if job.strict {
+        rows.push((
+            format!("no leftover above {limit} mm where cutters reach"),
+            vec![K::Leftover],
+            over,
+        ));
+    }
+    rows.into_iter()
+        .map(|(name, kinds, fine)| {
+            let bad = verdict.failures.iter().find(|f| kinds.contains(&f.kind));
+            Check { name, passed: bad.is_none(), found: bad.map_or(fine, |f| f.sentence.clone()) }
+        })
+        .collect()
+}
+
+/// The result for scripts.
+pub(super) fn json(carving: &Carving, folder: &Path) -> serde_json::Result<String> {
+    let verdict = &carving.verdict;
+    let job = &carving.design.job;
+    let files: Vec<_> = carving.programs.iter().map(|p| folder.join(&p.name)).collect();
+    serde_json::to_string_pretty(&serde_json::json!({
+        "title": job.title,
+        "folder": folder,
+        "programs": files,
+        "passed": verdict.passed(),
+        "seconds": verdict.seconds,
+        "leftover": verdict.leftover,
+        "gouge": verdict.gouge,
+        "reports": verdict.programs,
+        "stock_mm": [job.stock.width_mm, job.stock.height_mm, job.stock.thickness_mm],
+        "notes": carving.notes,
+    }))
+}

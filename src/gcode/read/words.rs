@@ -1,0 +1,281 @@
+//! One line of bytes -> its words, each letter and each modal group at most once.
+
+use super::Fault;
+use crate::geom::arc::{Plane, Turn};
+
+/// Longest line that GRBL's buffer takes, characters.
+const MAX_LINE: usize = 79;
+
+/// Digits that an f64 holds exactly.
+const MAX_DIGITS: usize = 15;
+
+/// 10^k, exact.
+const POW10: [f64; MAX_DIGITS + 1] =
+    [1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15];
+
+/// How axis words move the tool.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Motion {
+    Rapid,
+    Straight,
+    Arc(Turn),
+}
+
+/// What coordinates count from.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Distance {
+    Absolute,
+    Incremental,
+}
+
+/// The words of one line.
+#[derive(Debug, Default)]
+pub(super) struct Line {
+    pub(super) motion: Option<Motion>,
+    pub(super) plane: Option<Plane>,
+    pub(super) distance: Option<Distance>,
+    pub(super) inches: Option<bool>,
+    pub(super) spindle: Option<bool>,
+    pub(super) dwell: bool,
+    pub(super) end: bool,
+    feed_mode: Option<()>,
+    work_offset: Option<()>,
+    /// Letters of this line, and those whose value nobody has taken yet; bit 0 = A.
+    seen: u32,
+    open: u32,
+    /// Value and column of each letter seen.
+    values: [f64; 26],
+    columns: [u8; 26],
+    first_column: u8,
+}
+
+impl Line {
+    /// True when there is no word on the line.
+    pub(super) fn is_empty(&self) -> bool {
+        self.seen == 0
+    }
+
+    /// Column of the first word.
+    pub(super) fn first_column(&self) -> u32 {
+        u32::from(self.first_column)
+    }
+
+    /// Column of the word with this letter (the last one for G and M).
+    pub(super) fn column(&self, letter: u8) -> u32 {
+        u32::from(self.columns[usize::from(letter - b'A')])
+    }
+
+    /// The value of a word, marked as used.
+    #[inline]
+    pub(super) fn take(&mut self, letter: u8) -> Option<f64> {
+        let bit = 1 << (letter - b'A');
+        if self.open & bit == 0 {
+            return None;
+        }
+        self.open &= !bit;
+        Some(self.values[usize::from(letter - b'A')])
+    }
+
+    /// A letter that nothing has taken.
+    pub(super) fn unused(&self) -> Option<u8> {
+        (self.open != 0).then(|| b'A' + self.open.trailing_zeros() as u8)
+    }
+
+    /// Forgets the last line. Values and columns stay: nobody asks for those of letters not seen.
+    fn clear(&mut self) {
+        (self.motion, self.plane, self.distance) = (None, None, None);
+        (self.inches, self.spindle) = (None, None);
+        (self.dwell, self.end) = (false, false);
+        (self.feed_mode, self.work_offset) = (None, None);
+        (self.seen, self.open) = (0, 0);
+    }
+
+    /// Notes a word; the error is the fault of it.
+    #[inline]
+    fn add(&mut self, letter: u8, column: u8, value: f64) -> Result<(), fn(String) -> Fault> {
+        let k = usize::from(letter - b'A');
+        let bit = 1_u32 << k;
+        if self.seen == 0 {
+            self.first_column = column;
+        }
+        self.columns[k] = column;
+        match letter {
+            b'G' => {
+                self.seen |= bit;
+                self.add_g(value)
+            }
+            b'M' => {
+                self.seen |= bit;
+                self.add_m(value)
+            }
+            b'X' | b'Y' | b'Z' | b'I' | b'J' | b'K' | b'R' | b'F' | b'S' | b'T' | b'P' => {
+                if self.seen & bit != 0 {
+                    return Err(Fault::Repeated);
+                }
+                self.seen |= bit;
+                self.open |= bit;
+                self.values[k] = value;
+                Ok(())
+            }
+            _ => Err(Fault::UnknownWord),
+        }
+    }
+
+    fn add_g(&mut self, value: f64) -> Result<(), fn(String) -> Fault> {
+        match code(value) {
+            Some(0) => once(&mut self.motion, Motion::Rapid),
+            Some(1) => once(&mut self.motion, Motion::Straight),
+            Some(2) => once(&mut self.motion, Motion::Arc(Turn::Clockwise)),
+            Some(3) => once(&mut self.motion, Motion::Arc(Turn::CounterClockwise)),
+            Some(4) => flag(&mut self.dwell),
+            Some(17) => once(&mut self.plane, Plane::Xy),
+            Some(18) => once(&mut self.plane, Plane::Zx),
+            Some(19) => once(&mut self.plane, Plane::Yz),
+            Some(20) => once(&mut self.inches, true),
+            Some(21) => once(&mut self.inches, false),
+            Some(54) => once(&mut self.work_offset, ()),
+            Some(90) => once(&mut self.distance, Distance::Absolute),
+            Some(91) => once(&mut self.distance, Distance::Incremental),
+            Some(94) => once(&mut self.feed_mode, ()),
+            _ => Err(Fault::UnknownWord),
+        }
+    }
+
+    fn add_m(&mut self, value: f64) -> Result<(), fn(String) -> Fault> {
+        match code(value) {
+            Some(2 | 30) => flag(&mut self.end),
+            Some(3 | 4) => once(&mut self.spindle, true),
+            Some(5) => once(&mut self.spindle, false),
+            _ => Err(Fault::UnknownWord),
+        }
+    }
+}
+
+fn code(value: f64) -> Option<u32> {
+    (value.fract() == 0.0 && (0.0..1000.0).contains(&value)).then_some(value as u32)
+}
+
+fn once<T>(slot: &mut Option<T>, value: T) -> Result<(), fn(String) -> Fault> {
+    if slot.is_some() {
+        return Err(Fault::Repeated);
+    }
+    *slot = Some(value);
+    Ok(())
+}
+
+fn flag(slot: &mut bool) -> Result<(), fn(String) -> Fault> {
+    if *slot {
+        return Err(Fault::Repeated);
+    }
+    *slot = true;
+    Ok(())
+}
+
+/// Reads the first line of `text` into `line` and gives its length and that of its end together.
+///
+/// # Errors
+/// Column (from 1) and fault.
+pub(super) fn next_line(text: &[u8], line: &mut Line) -> Result<usize, (u32, Fault)> {
+    line.clear();
+    let mut at = 0;
+    while let Some(&c) = text.get(at) {
+        match c {
+            b'\n' | b'\r' => break,
+            b' ' | b'\t' => at += 1,
+            b'(' => at = comment(text, at, Some(b')'))?,
+            b';' => at = comment(text, at, None)?,
+            b'A'..=b'Z' | b'a'..=b'z' if at < MAX_LINE => {
+                let column = at as u8 + 1;
+                let Some((value, next)) = number(text, at + 1) else {
+                    return Err((u32::from(column), Fault::BadNumber(word_at(text, at))));
+                };
+                line.add(c.to_ascii_uppercase(), column, value)
+                    .map_err(|fault| (u32::from(column), fault(word_at(text, at))))?;
+                at = next;
+            }
+            _ if !is_plain(c) => return Err(bad_character(text, at)),
+            _ if at >= MAX_LINE => at += 1,
+            _ => return Err((at as u32 + 1, Fault::UnknownWord(word_at(text, at)))),
+        }
+    }
+    if at > MAX_LINE {
+        return Err((MAX_LINE as u32 + 1, Fault::TooLong(at)));
+    }
+    Ok(at + usize::from(text[at..].starts_with(b"\r\n")) + usize::from(at < text.len()))
+}
+
+/// The end of the comment that starts at `at`.
+fn comment(text: &[u8], at: usize, close: Option<u8>) -> Result<usize, (u32, Fault)> {
+    let mut i = at + 1;
+    while let Some(&c) = text.get(i) {
+        if c == b'\n' || c == b'\r' {
+            break;
+        }
+        if !is_plain(c) && c != b'\t' {
+            return Err(bad_character(text, i));
+        }
+        i += 1;
+        if Some(c) == close {
+            return Ok(i);
+        }
+    }
+    if close.is_some() { Err((at as u32 + 1, Fault::OpenComment)) } else { Ok(i) }
+}
+
+/// Printable ASCII that is no realtime command of the firmware.
+fn is_plain(c: u8) -> bool {
+    (b' '..=b'~').contains(&c) && !matches!(c, b'!' | b'?' | b'~')
+}
+
+fn bad_character(text: &[u8], at: usize) -> (u32, Fault) {
+    let shown = match text[at] {
+        c @ b' '..=b'~' => char::from(c).to_string(),
+        c => format!("0x{c:02X}"),
+    };
+    (at as u32 + 1, Fault::BadCharacter(shown))
+}
+
+/// A number as GRBL reads it: sign, digits, point. Its value and where it ends.
+#[inline]
+fn number(text: &[u8], from: usize) -> Option<(f64, usize)> {
+    let mut at = from;
+    while matches!(text.get(at), Some(b' ' | b'\t')) {
+        at += 1;
+    }
+    let negative = match text.get(at) {
+        Some(b'-') => {
+            at += 1;
+            true
+        }
+        Some(b'+') => {
+            at += 1;
+            false
+        }
+        _ => false,
+    };
+    let (mut mantissa, mut digits, mut point) = (0_u64, 0, None);
+    loop {
+        match text.get(at) {
+            Some(&c @ b'0'..=b'9') => {
+                mantissa = mantissa.wrapping_mul(10).wrapping_add(u64::from(c - b'0'));
+                digits += 1;
+            }
+            Some(b'.') if point.is_none() => point = Some(digits),
+            _ => break,
+        }
+        at += 1;
+    }
+    if digits == 0 || digits > MAX_DIGITS {
+        return None;
+    }
+    let value = mantissa as f64 / POW10[digits - point.unwrap_or(digits)];
+    Some((if negative { -value } else { value }, at))
+}
+
+/// The word at a place, for messages.
+pub(super) fn word_at(text: &[u8], at: usize) -> String {
+    let inside =
+        |c: &u8| c.is_ascii_graphic() && !c.is_ascii_alphabetic() && !matches!(c, b'(' | b';');
+    let tail = text[at + 1..].iter().take(20).take_while(|c| inside(c)).count();
+    String::from_utf8_lossy(&text[at..=at + tail]).into_owned()
+}

@@ -1,0 +1,638 @@
+//! Every key of every file that a user writes, in one table: name, type, range, default, meaning.
+//!
+//! The checks on reading, `relievo new` and `relievo defaults` are all made from it. Numbers that
+//! rules work with stand beside it in [`rule`].
+
+/// One section of a file, as `[stock]` or `[[layer]]`.
+#[derive(Debug)]
+pub(super) struct Section {
+    /// Name for messages; in a job also its path.
+    pub(super) name: &'static str,
+    /// As written in a file; empty for the top level.
+    pub(super) header: &'static str,
+    /// What it is about.
+    pub(super) doc: &'static str,
+    /// Its keys, in the order in which they are written out.
+    pub(super) keys: &'static [Key],
+}
+
+impl Section {
+    /// The key called `name`.
+    pub(super) fn key(&self, name: &str) -> Option<&'static Key> {
+        self.keys.iter().find(|key| key.name == name)
+    }
+}
+
+/// One key.
+#[derive(Debug)]
+pub(super) struct Key {
+    /// As written in a file.
+    pub(super) name: &'static str,
+    /// What may stand behind it.
+    pub(super) kind: Kind,
+    /// What holds when it is not given.
+    pub(super) default: Fallback,
+    /// What it means.
+    pub(super) doc: &'static str,
+}
+
+/// What may stand behind a key.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Kind {
+    /// Text, not empty.
+    Text,
+    /// `true` or `false`.
+    Flag,
+    /// A number from `min` to `max`, both included.
+    Number { min: f64, max: f64, unit: &'static str },
+    /// A whole number from `min` to `max`, both included.
+    Whole { min: u32, max: u32 },
+    /// One of these words.
+    Choice(&'static [&'static str]),
+    /// A list of texts.
+    Texts,
+    /// Three numbers, for X, Y and Z.
+    Vector { min: f64, max: f64, unit: &'static str },
+    /// Pairs of numbers with rising first ones: [diameter, chip load].
+    Pairs { min: f64, max: f64, unit: &'static str },
+    /// Several forms; its reader checks them. The text lists them.
+    Forms(&'static str),
+}
+
+impl Kind {
+    /// Unit of the value, for tables; empty where there is none.
+    pub(super) fn unit(self) -> &'static str {
+        match self {
+            Self::Number { unit, .. } | Self::Vector { unit, .. } | Self::Pairs { unit, .. } => {
+                unit
+            }
+            _ => "",
+        }
+    }
+}
+
+/// What holds when a key is not given.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Fallback {
+    /// The key must be given.
+    Required,
+    /// This number.
+    Number(f64),
+    /// This text or word.
+    Text(&'static str),
+    /// This flag.
+    Flag(bool),
+    /// Found by this rule, or nothing at all.
+    Rule(&'static str),
+}
+
+/// Numbers of the rules by which defaults are found.
+pub(super) mod rule {
+    /// Longer side of artwork in pixels or without a size, mm.
+    pub(in crate::job) const PIXEL_ART_MM: f64 = 150.0;
+    /// Wood left around the artwork on each side when the stock has no size, mm.
+    pub(in crate::job) const MARGIN_MM: f64 = 10.0;
+    /// A stock without a size is rounded up to this, mm.
+    pub(in crate::job) const STOCK_STEP_MM: f64 = 0.1;
+    /// Nodes along the stock's longer side at the default pitch.
+    pub(in crate::job) const NODES: f64 = 2000.0;
+    /// Finest and coarsest default pitch, mm.
+    pub(in crate::job) const PITCH_MM: (f64, f64) = (0.05, 0.2);
+    /// Kept between the highest default layer and the stock's top, mm.
+    pub(in crate::job) const HEADROOM_MM: f64 = 0.5;
+    /// Lowest default layer as a fraction of the highest.
+    pub(in crate::job) const LOWEST_LAYER: f64 = 0.4;
+    /// Default layer heights are rounded to this, mm.
+    pub(in crate::job) const HEIGHT_STEP_MM: f64 = 0.01;
+    /// Cutter of an operation that names none: roughing, finishing.
+    pub(in crate::job) const CUTTERS: (&str, &str) = ("flat-6", "ball-3");
+    /// Distance of roughing passes as a fraction of the cutter's diameter.
+    pub(in crate::job) const ROUGH_STEPOVER: f64 = 0.4;
+    /// Distance of finishing passes of a flat cutter, which leaves no cusps, as a fraction of its diameter.
+    pub(in crate::job) const FLAT_STEPOVER: f64 = 0.1;
+    /// Spindle speed wanted when the job gives none, 1/min.
+    pub(in crate::job) const SPINDLE_RPM: f64 = 18_000.0;
+    /// Slowest spindle speed that a rule may choose, 1/min: below it nothing is cut.
+    pub(in crate::job) const SLOWEST_RPM: f64 = 100.0;
+    /// Smallest depth of a level that a rule may choose, mm.
+    pub(in crate::job) const LEAST_STEPDOWN_MM: f64 = 0.01;
+    /// Plunge speed as a fraction of the feed.
+    pub(in crate::job) const PLUNGE: f64 = 0.25;
+    /// `background = "leave"`: cleared this much further than the largest cutter is wide, mm.
+    pub(in crate::job) const LEAVE_EXTRA_MM: f64 = 1.0;
+    /// The part of the error budget that is not the user's: exact drops 0.002, three decimals 0.001, arc chords 0.002, mm.
+    pub(in crate::job) const BUDGET_MM: f64 = 0.005;
+    /// Wood under the background below which the user is told, mm.
+    pub(in crate::job) const THIN_FLOOR_MM: f64 = 2.0;
+}
+
+/// Names of [`super::Origin`], in its order.
+pub(super) const ORIGINS: &[&str] =
+    &["lower-left", "lower-right", "upper-left", "upper-right", "center"];
+/// Names of [`super::Profile`], in its order.
+pub(super) const PROFILES: &[&str] = &["parabola", "round", "chamfer", "cove", "ogee"];
+/// Names of [`super::Combine`], in its order.
+pub(super) const COMBINES: &[&str] =
+    &["base", "add", "max", "min", "subtract", "multiply", "replace"];
+/// Names of [`super::CutterShape`], in its order.
+pub(super) const SHAPES: &[&str] = &["flat", "ball"];
+/// Surface methods that there are.
+pub(super) const METHODS: &[&str] = &["profile"];
+/// Kinds of operation that there are.
+pub(super) const OPERATIONS: &[&str] = &["rough", "raster"];
+
+const LENGTH: f64 = 10_000.0;
+
+/// Shorthand for a number of millimetres.
+const fn mm(min: f64, max: f64) -> Kind {
+    Kind::Number { min, max, unit: "mm" }
+}
+
+/// Shorthand for an angle.
+const fn deg(min: f64, max: f64) -> Kind {
+    Kind::Number { min, max, unit: "degrees" }
+}
+
+const fn key(name: &'static str, kind: Kind, default: Fallback, doc: &'static str) -> Key {
+    Key { name, kind, default, doc }
+}
+
+use Fallback::{Flag, Number, Required, Rule, Text};
+
+/// The sections of a job, in the order in which they are written out.
+pub(super) static JOB: [&Section; 9] =
+    [&TOP, &STOCK, &ARTWORK, &RELIEF, &TOLERANCE, &SAFETY, &LAYER, &SURFACE, &OPERATION];
+
+/// Top level of a job.
+pub(super) static TOP: Section = Section {
+    name: "job",
+    header: "",
+    doc: "the job as a whole",
+    keys: &[
+        key("title", Kind::Text, Rule("the artwork's file name"), "name for headers and reports"),
+        key(
+            "machine",
+            Kind::Forms(
+                "a name (`relievo machines` lists them), the path of a .toml file, or a [machine] table",
+            ),
+            Text("shapeoko3"),
+            "the router: a name from `relievo machines`, or the path of a .toml file",
+        ),
+        key(
+            "strict",
+            Kind::Flag,
+            Flag(false),
+            "refuse a program that leaves more wood than scallop_mm + gouge_mm where its cutters reach",
+        ),
+        key("stock", Kind::Forms("a [stock] table"), Rule("as below"), "the wood"),
+        key("artwork", Kind::Forms("an [artwork] table"), Required, "the drawing"),
+        key("relief", Kind::Forms("a [relief] table"), Rule("as below"), "the heightfield"),
+        key("tolerance", Kind::Forms("a [tolerance] table"), Rule("as below"), "small numbers"),
+        key("safety", Kind::Forms("a [safety] table"), Rule("as below"), "travel above the wood"),
+        key(
+            "layer",
+            Kind::Forms("[[layer]] tables"),
+            Rule("one for each fill and each stroke colour, in paint order"),
+            "the layers, bottom to top",
+        ),
+        key(
+            "operation",
+            Kind::Forms("[[operation]] tables"),
+            Rule("rough, then raster"),
+            "what is done, in this order",
+        ),
+    ],
+};
+
+/// `[stock]`
+pub(super) static STOCK: Section = Section {
+    name: "stock",
+    header: "[stock]",
+    doc: "the wood on the machine; Z zero is its top",
+    keys: &[
+        key(
+            "width_mm",
+            mm(1.0, LENGTH),
+            Rule("artwork + 10 on each side (inside the frame)"),
+            "size along X",
+        ),
+        key(
+            "height_mm",
+            mm(1.0, LENGTH),
+            Rule("artwork + 10 on each side (inside the frame)"),
+            "size along Y",
+        ),
+        key("thickness_mm", mm(0.5, 1000.0), Number(20.0), "size along Z"),
+        key(
+            "wood",
+            Kind::Forms("a name (`relievo woods` lists them) or a [stock.wood] table"),
+            Text("beech"),
+            "a name from `relievo woods`: chip loads, depth of levels",
+        ),
+        key(
+            "grain_deg",
+            deg(-360.0, 360.0),
+            Number(0.0),
+            "direction of the grain, from the X axis",
+        ),
+        key(
+            "origin",
+            Kind::Choice(ORIGINS),
+            Text("lower-left"),
+            "where X/Y zero lies on the stock",
+        ),
+    ],
+};
+
+/// `[artwork]`
+pub(super) static ARTWORK: Section = Section {
+    name: "artwork",
+    header: "[artwork]",
+    doc: "the drawing; sizes are those of the box around its shapes",
+    keys: &[
+        key("file", Kind::Text, Required, "the SVG file, seen from the job file's folder"),
+        key(
+            "width_mm",
+            mm(0.1, LENGTH),
+            Rule("the file's own size; pixel art: longer side 150"),
+            "fit to this width; with height_mm: as large as fits into both",
+        ),
+        key("height_mm", mm(0.1, LENGTH), Rule("follows the width"), "fit to this height"),
+        key(
+            "scale",
+            Kind::Number { min: 1e-4, max: 1e4, unit: "" },
+            Rule("1, when the file gives physical sizes"),
+            "the file's own size (96 px an inch) times this",
+        ),
+        key(
+            "at",
+            Kind::Forms("\"center\" or [x, y] in mm"),
+            Text("center"),
+            "\"center\" of the stock, or [x, y] of the lower left corner, mm",
+        ),
+        key(
+            "font_dirs",
+            Kind::Texts,
+            Rule("the system's fonts"),
+            "folders with fonts for text, as [\"fonts\"]",
+        ),
+    ],
+};
+
+/// `[relief]`
+pub(super) static RELIEF: Section = Section {
+    name: "relief",
+    header: "[relief]",
+    doc: "the heightfield and its background plane",
+    keys: &[
+        key(
+            "pitch_mm",
+            mm(0.005, 5.0),
+            Rule("longer side of the stock / 2000, but 0.05 to 0.2"),
+            "distance of the heightfield's nodes: its finest detail",
+        ),
+        key(
+            "depth_mm",
+            mm(0.1, 500.0),
+            Number(8.0),
+            "the background lies this far below the stock's top",
+        ),
+        key(
+            "background",
+            Kind::Forms("\"clear\", \"leave\", { frame_mm = N } or { leave_mm = N }"),
+            Text("clear"),
+            "\"clear\" to the stock's edge, { frame_mm = N } keeps a frame, { leave_mm = N } or \"leave\" cuts only near the artwork",
+        ),
+    ],
+};
+
+/// The table form of `relief.background`.
+pub(super) static BACKGROUND: Section = Section {
+    name: "background",
+    header: "background = { ... }",
+    doc: "what happens outside the artwork",
+    keys: &[
+        key(
+            "frame_mm",
+            mm(0.1, LENGTH),
+            Rule("no frame"),
+            "width of the frame that stays along the stock's edge",
+        ),
+        key(
+            "leave_mm",
+            mm(0.1, LENGTH),
+            Rule("widest cutter + 1"),
+            "how far around the artwork the background is cleared",
+        ),
+    ],
+};
+
+/// `[tolerance]`
+pub(super) static TOLERANCE: Section = Section {
+    name: "tolerance",
+    header: "[tolerance]",
+    doc: "how exact is exact; fit_mm + 0.005 must not be more than gouge_mm",
+    keys: &[
+        key(
+            "chord_mm",
+            mm(0.0005, 1.0),
+            Number(0.02),
+            "farthest that a straight piece may leave the artwork's curve",
+        ),
+        key(
+            "fit_mm",
+            mm(0.0002, 0.5),
+            Number(0.004),
+            "how far above the exact path a fitted line may run, never below",
+        ),
+        key(
+            "gouge_mm",
+            mm(0.006, 1.0),
+            Number(0.01),
+            "deepest cut into the relief that the proof lets pass",
+        ),
+        key(
+            "scallop_mm",
+            mm(0.0005, 1.0),
+            Number(0.01),
+            "height of the cusps between finishing passes",
+        ),
+    ],
+};
+
+/// `[safety]`
+pub(super) static SAFETY: Section = Section {
+    name: "safety",
+    header: "[safety]",
+    doc: "travel above the wood and entries into it",
+    keys: &[
+        key(
+            "safe_z_mm",
+            mm(0.5, 200.0),
+            Number(5.0),
+            "height of rapid travel above the stock's top",
+        ),
+        key(
+            "clearance_mm",
+            mm(0.05, 50.0),
+            Number(1.0),
+            "gap above the wood where a rapid down ends and a feed begins",
+        ),
+        key("ramp_deg", deg(0.5, 30.0), Number(5.0), "steepest entry into wood"),
+    ],
+};
+
+/// `[[layer]]`
+pub(super) static LAYER: Section = Section {
+    name: "layer",
+    header: "[[layer]]",
+    doc: "one part of the relief; layers join from the bottom to the top",
+    keys: &[
+        key("name", Kind::Text, Rule("the selector"), "name for messages and reports"),
+        key(
+            "select",
+            Kind::Forms(
+                "\"fill:#rrggbb\", \"stroke:#rrggbb\", \"label:...\", \"id:...\", \"layer:...\" or \"all\"",
+            ),
+            Required,
+            "which shapes: fill:COLOUR, stroke:COLOUR, label:TEXT, id:TEXT, layer:TEXT or all",
+        ),
+        key(
+            "surface",
+            Kind::Forms(
+                "\"profile\" or { method = \"profile\", profile = \"parabola\", radius_mm = N }",
+            ),
+            Text("profile"),
+            "how the surface is made from the outline",
+        ),
+        key(
+            "base_mm",
+            mm(0.0, 500.0),
+            Number(0.0),
+            "height of the outline above the background (a wall where > 0)",
+        ),
+        key(
+            "height_mm",
+            mm(0.0, 500.0),
+            Rule("stepped by order from 40 % to 100 % of depth_mm - 0.5"),
+            "height of the ridge above the background",
+        ),
+        key("offset_mm", mm(-500.0, 500.0), Number(0.0), "raises the whole layer"),
+        key("combine", Kind::Choice(COMBINES), Text("max"), "how it joins what is below"),
+        key("blend_mm", mm(0.0, 100.0), Number(0.0), "radius of the soft seam for max and min"),
+        key(
+            "feather_mm",
+            mm(0.0, 100.0),
+            Number(0.0),
+            "width over which replace, add and subtract fade in",
+        ),
+        key(
+            "draft_deg",
+            deg(0.0, 60.0),
+            Number(0.0),
+            "slope of walls from the vertical (with base_mm > 0)",
+        ),
+        key(
+            "slope_cap",
+            Kind::Forms("a number from 0.05 to 1000 (rise over run) or \"none\""),
+            Number(4.0),
+            "steepest flank (rise over run) of a narrow figure; \"none\" = no cap",
+        ),
+        key("union", Kind::Flag, Flag(false), "melt the layer's paths into one figure"),
+        key(
+            "visible",
+            Kind::Flag,
+            Flag(false),
+            "trim the layer to what the paint order leaves visible",
+        ),
+    ],
+};
+
+/// Range of `layer.slope_cap` when it is a number.
+pub(super) static SLOPE_CAP: Kind = Kind::Number { min: 0.05, max: 1000.0, unit: "" };
+
+/// Range of the numbers in `artwork.at`.
+pub(super) static AT: Kind = mm(-LENGTH, LENGTH);
+
+/// The table form of `layer.surface`.
+pub(super) static SURFACE: Section = Section {
+    name: "surface",
+    header: "surface = { ... }",
+    doc: "how a layer's surface is made (inside a [[layer]])",
+    keys: &[
+        key(
+            "method",
+            Kind::Forms("\"profile\""),
+            Text("profile"),
+            "profile: height by the distance to the outline",
+        ),
+        key("profile", Kind::Choice(PROFILES), Text("parabola"), "cross-section of the flank"),
+        key(
+            "radius_mm",
+            mm(0.01, LENGTH),
+            Rule("half the width of each figure"),
+            "the flank ends and a flat top begins this far inside",
+        ),
+    ],
+};
+
+/// `[[operation]]`
+pub(super) static OPERATION: Section = Section {
+    name: "operation",
+    header: "[[operation]]",
+    doc: "what is done, in this order",
+    keys: &[
+        key(
+            "kind",
+            Kind::Forms("\"rough\" or \"raster\""),
+            Required,
+            "rough: remove the bulk in levels; raster: parallel finishing passes",
+        ),
+        key(
+            "cutter",
+            Kind::Forms(
+                "a name (`relievo cutters` lists them) or a table { shape = \"ball\", diameter_mm = 3, ... }",
+            ),
+            Rule("rough: flat-6, raster: ball-3"),
+            "a name from `relievo cutters`, or a table as in machines/cutters.toml",
+        ),
+        key("leave_mm", mm(0.0, 20.0), Number(0.5), "rough: wood left on the relief"),
+        key(
+            "stepdown_mm",
+            mm(0.01, 100.0),
+            Rule("the wood's stepdown_per_diameter x diameter"),
+            "rough: depth of a level",
+        ),
+        key(
+            "stepover_mm",
+            mm(0.005, 200.0),
+            Rule("rough: 40 % of the diameter; raster: by scallop_mm, flat cutters 10 %"),
+            "distance of the passes",
+        ),
+        key(
+            "scallop_mm",
+            mm(0.0005, 1.0),
+            Rule("tolerance.scallop_mm"),
+            "raster, ball cutters: height of the cusps, instead of stepover_mm",
+        ),
+        key(
+            "angle_deg",
+            deg(-360.0, 360.0),
+            Rule("along the grain"),
+            "direction of the passes, from the X axis",
+        ),
+        key(
+            "feed_mm_per_min",
+            Kind::Number { min: 0.1, max: 60_000.0, unit: "mm/min" },
+            Rule("chip load x flutes x spindle_rpm, at most the machine's speed"),
+            "speed along the path",
+        ),
+        key(
+            "plunge_mm_per_min",
+            Kind::Number { min: 0.01, max: 60_000.0, unit: "mm/min" },
+            Rule("25 % of the feed, at most the Z axis's speed"),
+            "highest downward speed",
+        ),
+        key(
+            "spindle_rpm",
+            Kind::Number { min: 100.0, max: 100_000.0, unit: "1/min" },
+            Rule("18000 within the machine's range; slower where the machine caps the feed"),
+            "spindle speed",
+        ),
+    ],
+};
+
+/// A machine's file, or `[machine]` in a job.
+pub(super) static MACHINE: Section = Section {
+    name: "machine",
+    header: "[machine]",
+    doc: "a router",
+    keys: &[
+        key("name", Kind::Text, Rule("the file's name"), "name in job files"),
+        key("title", Kind::Text, Rule("the file's name"), "name for people"),
+        key(
+            "travel_mm",
+            Kind::Vector { min: 1.0, max: 20_000.0, unit: "mm" },
+            Required,
+            "travel of X, Y, Z ($130-$132)",
+        ),
+        key(
+            "max_rate_mm_per_min",
+            Kind::Vector { min: 1.0, max: 200_000.0, unit: "mm/min" },
+            Required,
+            "highest speed of X, Y, Z ($110-$112)",
+        ),
+        key(
+            "acceleration_mm_per_s2",
+            Kind::Vector { min: 0.1, max: 100_000.0, unit: "mm/s^2" },
+            Required,
+            "acceleration of X, Y, Z ($120-$122)",
+        ),
+        key("junction_deviation_mm", mm(0.0, 2.0), Number(0.01), "junction deviation ($11)"),
+        key("arc_tolerance_mm", mm(0.0005, 1.0), Number(0.002), "arc tolerance ($12)"),
+        key(
+            "spindle_min_rpm",
+            Kind::Number { min: 0.0, max: 100_000.0, unit: "1/min" },
+            Required,
+            "slowest spindle speed",
+        ),
+        key(
+            "spindle_max_rpm",
+            Kind::Number { min: 100.0, max: 100_000.0, unit: "1/min" },
+            Required,
+            "fastest spindle speed",
+        ),
+        key(
+            "spindle_dwell_s",
+            Kind::Number { min: 0.0, max: 600.0, unit: "s" },
+            Number(3.0),
+            "wait after the spindle starts",
+        ),
+    ],
+};
+
+/// A cutter in `cutters.toml`, or `cutter = { ... }` in an operation.
+pub(super) static CUTTER: Section = Section {
+    name: "cutter",
+    header: "cutter = { ... }",
+    doc: "a cutter and what holds it",
+    keys: &[
+        key("name", Kind::Text, Rule("shape and diameter"), "name for messages and file names"),
+        key("shape", Kind::Choice(SHAPES), Required, "form of the cutting end"),
+        key("diameter_mm", mm(0.05, 100.0), Required, "cutting diameter"),
+        key("flutes", Kind::Whole { min: 1, max: 12 }, Number(2.0), "number of cutting edges"),
+        key("flute_mm", mm(0.1, 300.0), Required, "length of the cutting edges, from the tip"),
+        key("shank_mm", mm(0.1, 100.0), Rule("the diameter"), "diameter of the shank"),
+        key("stickout_mm", mm(0.1, 500.0), Required, "length from the tip to the collet"),
+        key("holder_mm", mm(0.1, 300.0), Number(22.0), "diameter of the collet nut"),
+    ],
+};
+
+/// A wood in `woods.toml`, or `[stock.wood]` in a job.
+pub(super) static WOOD: Section = Section {
+    name: "wood",
+    header: "[stock.wood]",
+    doc: "what a wood lets a cutter do",
+    keys: &[
+        key("name", Kind::Text, Rule("the table's name"), "name in job files"),
+        key("title", Kind::Text, Rule("the name"), "name for people"),
+        key(
+            "flat_chip_load_mm",
+            Kind::Pairs { min: 0.0001, max: 5.0, unit: "mm" },
+            Required,
+            "[diameter, chip load] of flat cutters, rising diameters",
+        ),
+        key(
+            "ball_chip_load_mm",
+            Kind::Pairs { min: 0.0001, max: 5.0, unit: "mm" },
+            Required,
+            "[diameter, chip load] of ball cutters in finishing",
+        ),
+        key(
+            "stepdown_per_diameter",
+            Kind::Number { min: 0.01, max: 5.0, unit: "" },
+            Required,
+            "depth of a roughing level / diameter of the cutter",
+        ),
+    ],
+};

@@ -1,0 +1,362 @@
+//! Layers: read from a job, made from the artwork when the job has none, settled.
+
+use std::ops::Range;
+
+use toml::de::{DeTable, DeValue};
+
+use super::colors;
+use super::draft::{Draft, text_or_form};
+use super::error::{JobError, Source, nearest, shown};
+use super::keys::{LAYER, METHODS, PROFILES, SLOPE_CAP, SURFACE, rule};
+use super::reader::{Table, as_number};
+use super::settle::{TOUCHING_MM, round};
+use super::types::{Combine, Found, FoundLayer, LayerSpec, Profile, Rgb, Selector, SurfaceSpec};
+
+/// A layer whose height may still be open.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct LayerDraft {
+    /// Complete but for the height when that is open.
+    pub(super) spec: LayerSpec,
+    pub(super) height_mm: Option<f64>,
+}
+
+impl Draft {
+    /// The layers with their heights.
+    pub(super) fn layers(&self, found: &Found) -> Result<Vec<LayerSpec>, JobError> {
+        let drafts = if self.layers.is_empty() {
+            default_layers(&found.layers)
+        } else {
+            for (index, layer) in self.layers.iter().enumerate() {
+                self.check_selector(index, &layer.spec, &found.selectors)?;
+            }
+            self.layers.clone()
+        };
+        if drafts.is_empty() {
+            let message = format!("{} holds no layer that can be carved", self.artwork.file);
+            let help = "fill a shape or give a stroke a width, or name a layer by [[layer]]";
+            return Err(self.impossible(&["artwork.file"], &message, help));
+        }
+        let count = drafts.len();
+        let layers: Vec<LayerSpec> = drafts
+            .into_iter()
+            .enumerate()
+            .map(|(index, layer)| LayerSpec {
+                height_mm: layer
+                    .height_mm
+                    .unwrap_or_else(|| stepped_height_mm(index, count, self.depth_mm)),
+                ..layer.spec
+            })
+            .collect();
+        self.check_heights(&layers)?;
+        Ok(layers)
+    }
+
+    fn check_selector(
+        &self,
+        index: usize,
+        layer: &LayerSpec,
+        there: &[Selector],
+    ) -> Result<(), JobError> {
+        if layer.select == Selector::All || there.contains(&layer.select) {
+            return Ok(());
+        }
+        let near = nearest_selector(&layer.select, there);
+        let message = format!("layer '{}': nothing in the artwork is {}", layer.name, layer.select);
+        let label = near.map_or(String::new(), |near| format!("did you mean \"{near}\"?"));
+        let help = format!("the artwork has: {}", listed(there, &layer.select));
+        let span = self.source.span_of(&[&format!("layer[{index}].select")]);
+        Err(JobError::UnknownName(self.source.fault(span, &message, &label, &help)))
+    }
+
+    /// A layer that stands by itself must not be asked to rise out of the stock, unless a later layer may
+    /// lower it again. What the surfaces really reach is checked when they are made.
+    fn check_heights(&self, layers: &[LayerSpec]) -> Result<(), JobError> {
+        for (index, layer) in layers.iter().enumerate() {
+            let alone = matches!(layer.combine, Combine::Base | Combine::Max | Combine::Replace);
+            let lowered = layers[index + 1..].iter().any(|later| {
+                matches!(
+                    later.combine,
+                    Combine::Min
+                        | Combine::Multiply
+                        | Combine::Subtract
+                        | Combine::Replace
+                        | Combine::Base
+                )
+            });
+            let top = layer.height_mm.max(layer.base_mm) + layer.offset_mm;
+            if alone && !lowered && top > self.depth_mm + TOUCHING_MM {
+                let message = format!(
+                    "layer '{}' would rise {} mm above the stock: it is {} mm high, the background lies {} mm deep",
+                    layer.name,
+                    round(top - self.depth_mm),
+                    round(top),
+                    self.depth_mm
+                );
+                let paths = ["height_mm", "base_mm", "offset_mm"]
+                    .map(|key| format!("layer[{index}].{key}"));
+                let paths: Vec<&str> =
+                    paths.iter().map(String::as_str).chain(["relief.depth_mm"]).collect();
+                let help = "lower the layer or raise relief.depth_mm";
+                return Err(self.impossible(&paths, &message, help));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Reads a layer from a checked table.
+pub(super) fn read_layer(table: &Table<'_>) -> Result<LayerDraft, JobError> {
+    let text = text_or_form(table, "select")?;
+    let select = read_selector(table, text)?;
+    let name = table.text("name").map_or_else(|| select.to_string(), str::to_owned);
+    layer(table, select, name)
+}
+
+/// A layer without keys of its own: everything by default.
+fn default_layer(select: Selector, name: String) -> LayerDraft {
+    let (source, nothing) = (Source::default(), DeTable::new());
+    layer(&Table::unchecked(&source, &LAYER, &nothing), select, name)
+        .expect("the defaults go together: a test reads them")
+}
+
+fn layer(table: &Table<'_>, select: Selector, name: String) -> Result<LayerDraft, JobError> {
+    let combine = [
+        Combine::Base,
+        Combine::Add,
+        Combine::Max,
+        Combine::Min,
+        Combine::Subtract,
+        Combine::Multiply,
+        Combine::Replace,
+    ][table.choice("combine")];
+    let height_mm = table.number("height_mm");
+    let relative = matches!(combine, Combine::Add | Combine::Subtract | Combine::Multiply);
+    if height_mm.is_none() && relative {
+        let message = format!(
+            "a layer that is combined by {} needs height_mm",
+            table.text("combine").unwrap_or("")
+        );
+        let help = "height_mm is measured from what is below; only layers that stand by themselves have a default";
+        let fault =
+            table.source.fault(Some(table.span_of("combine")), &message, "needs `height_mm`", help);
+        return Err(JobError::Missing(fault));
+    }
+    if combine == Combine::Multiply && height_mm == Some(0.0) {
+        let message = "a layer that multiplies needs height_mm above 0";
+        let help = "what is below is scaled by the layer's height over its height_mm";
+        return Err(table.impossible("height_mm", message, "", help));
+    }
+    let spec = LayerSpec {
+        name,
+        select,
+        surface: read_surface(table)?,
+        base_mm: table.sure_number("base_mm"),
+        height_mm: height_mm.unwrap_or_default(),
+        offset_mm: table.sure_number("offset_mm"),
+        combine,
+        blend_mm: table.sure_number("blend_mm"),
+        feather_mm: table.sure_number("feather_mm"),
+        draft_rad: table.sure_number("draft_deg").to_radians(),
+        slope_cap: read_slope_cap(table)?,
+        union: table.flag("union"),
+        visible: table.flag("visible"),
+    };
+    Ok(LayerDraft { spec, height_mm })
+}
+
+fn read_slope_cap(table: &Table<'_>) -> Result<f64, JobError> {
+    let Some(value) = table.raw("slope_cap") else { return Ok(table.sure_number("slope_cap")) };
+    match (value.get_ref(), as_number(value.get_ref())) {
+        (DeValue::String(word), _) if word == "none" => Ok(f64::INFINITY),
+        (_, Some(number)) => {
+            table.check_range("slope_cap", value.span(), number, SLOPE_CAP)?;
+            Ok(number)
+        }
+        (other, None) => Err(table.wrong_form("slope_cap", value.span(), other)),
+    }
+}
+
+fn read_surface(layer: &Table<'_>) -> Result<SurfaceSpec, JobError> {
+    let profiles =
+        [Profile::Parabola, Profile::Round, Profile::Chamfer, Profile::Cove, Profile::Ogee];
+    let plain = SurfaceSpec::Profile { profile: Profile::Parabola, radius_mm: None };
+    let Some(value) = layer.raw("surface") else { return Ok(plain) };
+    if let DeValue::Table(values) = value.get_ref() {
+        // The method comes first: another method's own keys would only mislead.
+        let method = values.get("method").and_then(|method| method.get_ref().as_str());
+        if let Some(method) = method {
+            check_method(layer, method, values.get("method").map(toml::Spanned::span))?;
+        }
+        let table = layer.table("surface", &SURFACE).expect("the table is given")?;
+        text_or_form(&table, "method")?;
+        return Ok(SurfaceSpec::Profile {
+            profile: profiles[table.choice("profile")],
+            radius_mm: table.number("radius_mm"),
+        });
+    }
+    check_method(layer, text_or_form(layer, "surface")?, None)?;
+    Ok(plain)
+}
+
+fn check_method(
+    layer: &Table<'_>,
+    method: &str,
+    span: Option<Range<usize>>,
+) -> Result<(), JobError> {
+    if METHODS.contains(&method) {
+        return Ok(());
+    }
+    let message = format!("there is no surface method {}", shown(method));
+    let help = format!(
+        "there is: {}; shapes of its flank: surface = {{ method = \"profile\", profile = \"round\" }} ({})",
+        METHODS.join(", "),
+        PROFILES.join(", ")
+    );
+    let span = span.unwrap_or_else(|| layer.span_of("surface"));
+    Err(JobError::UnknownName(layer.source.fault(Some(span), &message, "not built in", &help)))
+}
+
+fn read_selector(table: &Table<'_>, text: &str) -> Result<Selector, JobError> {
+    const KINDS: [&str; 6] = ["fill", "stroke", "label", "id", "layer", "all"];
+    let text = text.trim();
+    if text == "all" {
+        return Ok(Selector::All);
+    }
+    let refuse = |message: &str, label: &str, help: &str| {
+        let span = Some(table.span_of("select"));
+        Err(JobError::UnknownName(table.source.fault(span, message, label, help)))
+    };
+    let forms = "write \"fill:#008463\", \"stroke:black\", \"label:...\", \"id:...\", \"layer:...\" or \"all\"";
+    let Some((kind, rest)) = text.split_once(':') else {
+        let message = format!("{} is not a selector", shown(text));
+        return if read_color(text).is_some() {
+            refuse(&message, &format!("did you mean \"fill:{text}\"?"), forms)
+        } else {
+            refuse(&message, "what is it: a fill, a label, ...?", forms)
+        };
+    };
+    let (kind, rest) = (kind.trim(), rest.trim());
+    if rest.is_empty() {
+        return refuse(&format!("the selector {} is empty", shown(text)), "", forms);
+    }
+    match kind {
+        "fill" | "stroke" => match read_color(rest) {
+            Some(color) if kind == "fill" => Ok(Selector::Fill(color)),
+            Some(color) => Ok(Selector::Stroke(color)),
+            None => {
+                let message = format!("there is no colour {}", shown(rest));
+                let label = match nearest(rest, colors::names()).filter(|_| !rest.starts_with('#'))
+                {
+                    Some(near) => format!("did you mean \"{kind}:{near}\"?"),
+                    None => "not a colour".to_owned(),
+                };
+                refuse(&message, &label, "a colour is #rrggbb, #rgb or a CSS name such as tomato")
+            }
+        },
+        "label" => Ok(Selector::Label(rest.to_owned())),
+        "id" => Ok(Selector::Id(rest.to_owned())),
+        "layer" => Ok(Selector::Layer(rest.to_owned())),
+        _ => {
+            let message = format!("there is no selector {}", shown(&format!("{kind}:")));
+            let label = match nearest(kind, KINDS) {
+                Some(near) => format!("did you mean \"{near}:\"?"),
+                None => "not known".to_owned(),
+            };
+            refuse(&message, &label, forms)
+        }
+    }
+}
+
+/// `#rrggbb`, `#rgb` or a CSS name.
+fn read_color(text: &str) -> Option<Rgb> {
+    let Some(hex) = text.strip_prefix('#') else { return colors::named(text) };
+    if !hex.bytes().all(|b| b.is_ascii_hexdigit()) {
+        return None;
+    }
+    let digits = u32::from_str_radix(hex, 16).ok()?;
+    let byte = |shift: u32| (digits >> shift) as u8;
+    let double = |shift: u32| ((digits >> shift) & 15) as u8 * 17;
+    match hex.len() {
+        6 => Some(Rgb(byte(16), byte(8), byte(0))),
+        3 => Some(Rgb(double(8), double(4), double(0))),
+        _ => None,
+    }
+}
+
+/// One layer for each layer found; those without a name get the name of their colour.
+fn default_layers(found: &[FoundLayer]) -> Vec<LayerDraft> {
+    let mut names: Vec<String> = Vec::new();
+    found
+        .iter()
+        .map(|layer| {
+            let name = unique(&layer_name(layer), &names);
+            names.push(name.clone());
+            default_layer(layer.select.clone(), name)
+        })
+        .collect()
+}
+
+fn layer_name(layer: &FoundLayer) -> String {
+    match &layer.select {
+        _ if !layer.name.trim().is_empty() => layer.name.trim().to_owned(),
+        Selector::Fill(color) => colors::swatch_name(*color).to_owned(),
+        Selector::Stroke(color) => format!("{} line", colors::swatch_name(*color)),
+        other => other.to_string(),
+    }
+}
+
+/// `name`, or `name 2`, `name 3`, ... when it is taken.
+fn unique(name: &str, taken: &[String]) -> String {
+    let is_free = |wanted: &str| taken.iter().all(|one| one != wanted);
+    if is_free(name) {
+        return name.to_owned();
+    }
+    // As many numbers as there are names, and one more: one of them is free.
+    (2..taken.len() + 3)
+        .map(|number| format!("{name} {number}"))
+        .find(|wanted| is_free(wanted))
+        .expect("there are more numbers than names")
+}
+
+/// Height of layer `index` of `count` when it is not given: in even steps from 40 % to 100 % of the
+/// depth less the headroom (of half the depth when the relief is shallower than twice the headroom).
+fn stepped_height_mm(index: usize, count: usize, depth_mm: f64) -> f64 {
+    let top = (depth_mm - rule::HEADROOM_MM).max(depth_mm * 0.5);
+    let part = if count > 1 { index as f64 / (count - 1) as f64 } else { 1.0 };
+    let height = top * (rule::LOWEST_LAYER + (1.0 - rule::LOWEST_LAYER) * part);
+    let steps = (1.0 / rule::HEIGHT_STEP_MM).round();
+    ((height * steps + 1e-6).floor() / steps).max(rule::HEIGHT_STEP_MM)
+}
+
+/// The selector that was most likely meant: for a colour the nearest colour, for a name the nearest name.
+fn nearest_selector(wrong: &Selector, there: &[Selector]) -> Option<Selector> {
+    let fills =
+        || there.iter().filter_map(|s| if let Selector::Fill(c) = s { Some(*c) } else { None });
+    let strokes =
+        || there.iter().filter_map(|s| if let Selector::Stroke(c) = s { Some(*c) } else { None });
+    match wrong {
+        Selector::Fill(color) => colors::nearest_color(*color, fills()).map(Selector::Fill),
+        Selector::Stroke(color) => colors::nearest_color(*color, strokes()).map(Selector::Stroke),
+        _ => {
+            let names: Vec<String> = there.iter().map(ToString::to_string).collect();
+            let near = nearest(&wrong.to_string(), names.iter().map(String::as_str))?;
+            there.iter().find(|selector| selector.to_string() == near).cloned()
+        }
+    }
+}
+
+/// What the artwork has of the kind of `wrong`, at most a dozen.
+fn listed(there: &[Selector], wrong: &Selector) -> String {
+    const MOST: usize = 12;
+    let kind = std::mem::discriminant(wrong);
+    let same = there.iter().filter(|selector| std::mem::discriminant(*selector) == kind);
+    let names: Vec<String> = same.map(ToString::to_string).collect();
+    match names.len() {
+        0 => {
+            let others: Vec<String> = there.iter().take(MOST).map(ToString::to_string).collect();
+            others.join(", ")
+        }
+        count if count > MOST => format!("{}, and {} more", names[..MOST].join(", "), count - MOST),
+        _ => names.join(", "),
+    }
+}

@@ -1,0 +1,304 @@
+//! Operations: read from a job or taken from the defaults, settled with stock and machine.
+
+use toml::de::{DeTable, DeValue};
+
+use super::draft::{Draft, text_or_form};
+use super::error::{JobError, Source};
+use super::keys::{CUTTER, OPERATION, OPERATIONS, rule};
+use super::library::{Library, read_cutter};
+use super::reader::Table;
+use super::settle::round;
+use super::speeds::{self, Speeds, Wanted};
+use super::types::{CutterShape, CutterSpec, Operation, OperationKind, Stepover, Stock};
+
+/// An operation whose numbers may still be open.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct OperationDraft {
+    pub(super) kind: KindDraft,
+    pub(super) cutter: CutterSpec,
+    pub(super) leave_mm: f64,
+    pub(super) stepdown_mm: Option<f64>,
+    pub(super) stepover_mm: Option<f64>,
+    pub(super) scallop_mm: Option<f64>,
+    pub(super) angle_rad: Option<f64>,
+    pub(super) feed_mm_per_min: Option<f64>,
+    pub(super) plunge_mm_per_min: Option<f64>,
+    pub(super) spindle_rpm: Option<f64>,
+}
+
+/// What an operation does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum KindDraft {
+    Rough,
+    Raster,
+}
+
+/// The operations of a job that names none: rough, then raster.
+pub(super) fn default_operations(
+    source: &Source,
+    library: &Library,
+) -> Result<Vec<OperationDraft>, JobError> {
+    let nothing = DeTable::new();
+    let table = Table::unchecked(source, &OPERATION, &nothing);
+    [KindDraft::Rough, KindDraft::Raster]
+        .into_iter()
+        .map(|kind| operation(&table, kind, library))
+        .collect()
+}
+
+/// Reads an operation from a checked table.
+pub(super) fn read_operation(
+    table: &Table<'_>,
+    library: &Library,
+) -> Result<OperationDraft, JobError> {
+    let word = text_or_form(table, "kind")?;
+    let kind = match OPERATIONS.iter().position(|name| *name == word) {
+        Some(0) => KindDraft::Rough,
+        Some(_) => KindDraft::Raster,
+        None => return Err(table.unknown_word("kind", "kind of operation", word, OPERATIONS)),
+    };
+    let foreign: &[&str] = match kind {
+        KindDraft::Rough => &["scallop_mm"],
+        KindDraft::Raster => &["leave_mm", "stepdown_mm"],
+    };
+    if let Some(name) = foreign.iter().find(|name| table.raw(name).is_some()) {
+        let message = format!("`{name}` means nothing to a {word} operation");
+        let doc = table.section.key(name).map_or("", |key| key.doc);
+        return Err(table.impossible(
+            name,
+            &message,
+            "take this away",
+            &format!("{name} is for {doc}"),
+        ));
+    }
+    let draft = operation(table, kind, library)?;
+    if draft.stepover_mm.is_some() && draft.scallop_mm.is_some() {
+        let message = "the distance of the passes is given twice: by stepover_mm and by scallop_mm";
+        return Err(table.impossible("stepover_mm", message, "", "keep one of the two"));
+    }
+    if draft.scallop_mm.is_some() && draft.cutter.shape == CutterShape::Flat {
+        let message = format!("a flat cutter ({}) leaves no cusps", draft.cutter.name);
+        return Err(table.impossible(
+            "scallop_mm",
+            &message,
+            "",
+            "give stepover_mm, or take a ball cutter",
+        ));
+    }
+    Ok(draft)
+}
+
+fn operation(
+    table: &Table<'_>,
+    kind: KindDraft,
+    library: &Library,
+) -> Result<OperationDraft, JobError> {
+    let default_cutter = match kind {
+        KindDraft::Rough => rule::CUTTERS.0,
+        KindDraft::Raster => rule::CUTTERS.1,
+    };
+    Ok(OperationDraft {
+        kind,
+        cutter: read_cutter_choice(table, default_cutter, library)?,
+        leave_mm: table.sure_number("leave_mm"),
+        stepdown_mm: table.number("stepdown_mm"),
+        stepover_mm: table.number("stepover_mm"),
+        scallop_mm: table.number("scallop_mm"),
+        angle_rad: table.number("angle_deg").map(f64::to_radians),
+        feed_mm_per_min: table.number("feed_mm_per_min"),
+        plunge_mm_per_min: table.number("plunge_mm_per_min"),
+        spindle_rpm: table.number("spindle_rpm"),
+    })
+}
+
+fn read_cutter_choice(
+    table: &Table<'_>,
+    default: &'static str,
+    library: &Library,
+) -> Result<CutterSpec, JobError> {
+    if matches!(table.raw("cutter").map(toml::Spanned::get_ref), Some(DeValue::Table(_))) {
+        return read_cutter(&table.table("cutter", &CUTTER).expect("the cutter is given")?, None);
+    }
+    let name = match table.raw("cutter") {
+        Some(_) => text_or_form(table, "cutter")?,
+        None => default,
+    };
+    library.cutter(name).cloned().ok_or_else(|| {
+        let names: Vec<&str> = library.cutters().map(|cutter| cutter.name.as_str()).collect();
+        table.unknown_word("cutter", "cutter", name, &names)
+    })
+}
+
+impl Draft {
+    /// The operations with all their numbers.
+    pub(super) fn operations(
+        &self,
+        stock: &Stock,
+        pitch_mm: f64,
+        notes: &mut Vec<String>,
+    ) -> Result<Vec<Operation>, JobError> {
+        if self.operations.first().is_some_and(|op| op.kind == KindDraft::Raster) {
+            notes.push(
+                "no roughing comes before the finishing passes: they cut the full depth at once"
+                    .to_owned(),
+            );
+        }
+        self.operations
+            .iter()
+            .enumerate()
+            .map(|(index, draft)| {
+                let step = Step { job: self, index, draft, stock };
+                step.check_cutter(pitch_mm)?;
+                let speeds = step.speeds(notes)?;
+                Ok(Operation {
+                    kind: step.kind()?,
+                    cutter: draft.cutter.clone(),
+                    feed_mm_per_min: speeds.feed_mm_per_min,
+                    plunge_mm_per_min: speeds.plunge_mm_per_min,
+                    spindle_rpm: speeds.spindle_rpm,
+                })
+            })
+            .collect()
+    }
+}
+
+/// One operation on its way to be settled.
+struct Step<'a> {
+    job: &'a Draft,
+    index: usize,
+    draft: &'a OperationDraft,
+    stock: &'a Stock,
+}
+
+impl Step<'_> {
+    /// Points at the first of `keys` that is given, else at the whole operation.
+    fn refuse<T>(&self, keys: &[&str], message: &str, help: &str) -> Result<T, JobError> {
+        let whole = format!("operation[{}]", self.index);
+        let paths: Vec<String> = keys.iter().map(|key| format!("{whole}.{key}")).collect();
+        let paths: Vec<&str> = paths.iter().chain([&whole]).map(String::as_str).collect();
+        Err(self.job.impossible(&paths, message, help))
+    }
+
+    fn check_cutter(&self, pitch_mm: f64) -> Result<(), JobError> {
+        let (name, diameter) = (&self.draft.cutter.name, self.draft.cutter.diameter_mm);
+        let stock = self.stock;
+        if diameter > stock.width_mm.min(stock.height_mm) {
+            let message = format!(
+                "cutter {name} is {diameter} mm wide, wider than the stock ({} x {} mm)",
+                stock.width_mm, stock.height_mm
+            );
+            return self.refuse(&["cutter"], &message, "take a smaller cutter");
+        }
+        if diameter < 2.0 * pitch_mm {
+            let message = format!(
+                "cutter {name} is {diameter} mm wide, too fine for a heightfield of pitch {pitch_mm} mm"
+            );
+            let help = format!(
+                "set relief.pitch_mm to {} or less, or take a larger cutter",
+                diameter / 2.0
+            );
+            return self.refuse(&["cutter"], &message, &help);
+        }
+        Ok(())
+    }
+
+    fn speeds(&self, notes: &mut Vec<String>) -> Result<Speeds, JobError> {
+        let (draft, machine) = (self.draft, &self.job.machine);
+        let feed_limit = speeds::feed_limit_mm_per_min(machine);
+        let (slowest, fastest) = (machine.spindle_min_rpm, machine.spindle_max_rpm);
+        for (key, value, min, max, unit) in [
+            ("feed_mm_per_min", draft.feed_mm_per_min, 0.0, feed_limit, "mm/min"),
+            (
+                "plunge_mm_per_min",
+                draft.plunge_mm_per_min,
+                0.0,
+                machine.max_rate_mm_per_min.z,
+                "mm/min",
+            ),
+            ("spindle_rpm", draft.spindle_rpm, slowest, fastest, "1/min"),
+        ] {
+            if let Some(value) = value.filter(|value| *value < min || *value > max) {
+                let message = format!("{} cannot do {key} {value}", machine.title);
+                let help = format!("give a value from {min} to {max} {unit}, or none");
+                return self.refuse(&[key], &message, &help);
+            }
+        }
+        let wanted = Wanted {
+            feed_mm_per_min: draft.feed_mm_per_min,
+            plunge_mm_per_min: draft.plunge_mm_per_min,
+            spindle_rpm: draft.spindle_rpm,
+        };
+        let found = speeds::find(wanted, &self.stock.wood, &draft.cutter, machine);
+        notes.extend(self.chip_load_note(found));
+        Ok(found)
+    }
+
+    /// Tells when the chips are twice as thick, or half as thick, as the wood likes.
+    fn chip_load_note(&self, found: Speeds) -> Option<String> {
+        let (cutter, wood) = (&self.draft.cutter, &self.stock.wood);
+        let usual = speeds::chip_load_mm(wood, cutter);
+        let chip = found.feed_mm_per_min / (found.spindle_rpm * f64::from(cutter.flutes));
+        (chip > 2.0 * usual || chip < 0.5 * usual).then(|| {
+            format!(
+                "{} at {} mm/min and {} 1/min on {} takes chips of {chip:.3} mm; {} likes about {usual:.3} mm",
+                cutter.name,
+                found.feed_mm_per_min,
+                found.spindle_rpm,
+                self.job.machine.title,
+                wood.title
+            )
+        })
+    }
+
+    fn kind(&self) -> Result<OperationKind, JobError> {
+        let (draft, diameter) = (self.draft, self.draft.cutter.diameter_mm);
+        if draft.stepover_mm.is_some_and(|stepover| stepover > diameter) {
+            let message =
+                format!("passes further apart than the cutter is wide ({diameter} mm) leave ribs");
+            return self.refuse(&["stepover_mm"], &message, &format!("give {diameter} or less"));
+        }
+        let angle_rad = draft.angle_rad.unwrap_or(self.stock.grain_rad);
+        Ok(match draft.kind {
+            KindDraft::Rough => OperationKind::Rough {
+                leave_mm: draft.leave_mm,
+                stepdown_mm: self.stepdown_mm()?,
+                stepover_mm: draft.stepover_mm.unwrap_or(round(rule::ROUGH_STEPOVER * diameter)),
+                angle_rad,
+            },
+            KindDraft::Raster => OperationKind::Raster { stepover: self.stepover()?, angle_rad },
+        })
+    }
+
+    fn stepdown_mm(&self) -> Result<f64, JobError> {
+        let cutter = &self.draft.cutter;
+        let usual = round(self.stock.wood.stepdown_per_diameter * cutter.diameter_mm)
+            .max(rule::LEAST_STEPDOWN_MM);
+        let stepdown_mm = self.draft.stepdown_mm.unwrap_or(usual.min(cutter.flute_mm));
+        if stepdown_mm > cutter.flute_mm {
+            let message = format!(
+                "levels of {stepdown_mm} mm are deeper than the flutes of {} ({} mm)",
+                cutter.name, cutter.flute_mm
+            );
+            let help = "give less, or take a longer cutter";
+            return self.refuse(&["stepdown_mm"], &message, help);
+        }
+        Ok(stepdown_mm)
+    }
+
+    fn stepover(&self) -> Result<Stepover, JobError> {
+        let cutter = &self.draft.cutter;
+        if let Some(stepover_mm) = self.draft.stepover_mm {
+            return Ok(Stepover::Plan(stepover_mm));
+        }
+        if cutter.shape == CutterShape::Flat {
+            return Ok(Stepover::Plan(round(rule::FLAT_STEPOVER * cutter.diameter_mm)));
+        }
+        let scallop_mm = self.draft.scallop_mm.unwrap_or(self.job.tolerance.scallop_mm);
+        if scallop_mm >= cutter.diameter_mm / 2.0 {
+            let message =
+                format!("cusps of {scallop_mm} mm are higher than the radius of {}", cutter.name);
+            return self.refuse(&["scallop_mm", "cutter"], &message, "0.01 is usual");
+        }
+        Ok(Stepover::Scallop(scallop_mm))
+    }
+}

@@ -1,0 +1,304 @@
+//! [`Draft`] + what the artwork holds -> [`Job`]: sizes, stock, layers, speeds, and all checks that
+//! need the whole.
+
+use super::draft::{BackgroundDraft, Draft};
+use super::error::JobError;
+use super::keys::rule;
+use super::types::{Background, Fit, Found, Job, Place, ReliefSpec, Stock};
+use crate::geom::{Bounds, DVec2, Grid};
+
+/// Round-off allowed when the artwork just fits into the stock, mm.
+pub(super) const TOUCHING_MM: f64 = 1e-6;
+
+/// Millimetres a pixel has by the CSS rule of 96 px an inch.
+const PIXEL_MM: f64 = 25.4 / 96.0;
+
+/// Artwork between these sizes is taken to be meant, mm.
+const ARTWORK_MM: (f64, f64) = (0.1, 10_000.0);
+
+impl Draft {
+    /// Fills in all that hangs on the artwork and checks the job as a whole.
+    ///
+    /// # Errors
+    /// [`JobError::Impossible`] when things do not fit together, [`JobError::UnknownName`] when a layer
+    /// selects what the artwork does not have.
+    pub fn settle(self, found: &Found) -> Result<Job, JobError> {
+        let mut notes = Vec::new();
+        let (unit_mm, size) = self.artwork_size(found, &mut notes)?;
+        let background = self.background();
+        let stock = self.stock(size, background);
+        let bounds = stock.bounds();
+        let lower_left = match self.artwork.at {
+            Place::Center => bounds.center() - size * 0.5,
+            Place::LowerLeft(point) => point,
+        };
+        self.check_place(&stock, Bounds::new(lower_left, lower_left + size), background)?;
+        self.check_depth(&stock, &mut notes)?;
+        let pitch_mm = self.pitch(&stock)?;
+        let layers = self.layers(found)?;
+        let operations = self.operations(&stock, pitch_mm, &mut notes)?;
+        Ok(Job {
+            title: self.title.clone().unwrap_or_else(|| stem(&self.artwork.file)),
+            relief: ReliefSpec { pitch_mm, depth_mm: self.depth_mm, background },
+            stock,
+            layers,
+            operations,
+            tolerance: self.tolerance,
+            safe_z_mm: self.safe_z_mm,
+            clearance_mm: self.clearance_mm,
+            ramp_rad: self.ramp_rad,
+            strict: self.strict,
+            artwork_unit_mm: unit_mm,
+            artwork_lower_left_mm: lower_left,
+            artwork_size_mm: size,
+            notes,
+            machine: self.machine,
+            artwork: self.artwork,
+        })
+    }
+
+    /// Refuses what does not go together; points at the first of `paths` that the job gives.
+    pub(super) fn impossible(&self, paths: &[&str], message: &str, help: &str) -> JobError {
+        // A job file cures what the artwork alone is wrong in, but for artwork without any shape.
+        let help = if self.source.is_written() || paths == ["artwork.file"] {
+            help.to_owned()
+        } else {
+            format!("{help}; `relievo new {}` writes a job file to do it in", self.artwork.file)
+        };
+        JobError::Impossible(self.source.fault(self.source.span_of(paths), message, "", &help))
+    }
+
+    /// mm a file unit, and the size of the placed artwork.
+    fn artwork_size(
+        &self,
+        found: &Found,
+        notes: &mut Vec<String>,
+    ) -> Result<(f64, DVec2), JobError> {
+        const SIZE_KEYS: [&str; 4] =
+            ["artwork.width_mm", "artwork.height_mm", "artwork.scale", "artwork.file"];
+        let given = found.size;
+        if !given.is_finite() || given.min_element() <= 0.0 || found.selectors.is_empty() {
+            let message = format!("{} holds nothing that can be carved", self.artwork.file);
+            let help =
+                "a shape must enclose an area: closed paths with a fill, or strokes with a width";
+            return Err(self.impossible(&["artwork.file"], &message, help));
+        }
+        let own_mm = found.unit_mm.unwrap_or(PIXEL_MM);
+        // The side that is asked for must not lose a digit on the way through the file's units.
+        let by_width = |width: f64| (width / given.x, DVec2::new(width, width * given.y / given.x));
+        let by_height =
+            |height: f64| (height / given.y, DVec2::new(height * given.x / given.y, height));
+        let (unit, size) = match self.artwork.fit {
+            Fit::Width(width) => by_width(width),
+            Fit::Box(width, height) if width * given.y <= height * given.x => by_width(width),
+            Fit::Height(height) | Fit::Box(_, height) => by_height(height),
+            Fit::Scale(scale) => (own_mm * scale, given * own_mm * scale),
+            Fit::Own if found.unit_mm.is_some() => (own_mm, given * own_mm),
+            Fit::Own => {
+                let longer = given.max_element();
+                let size = given * (rule::PIXEL_ART_MM / longer);
+                notes.push(format!(
+                    "{} gives no physical size: its longer side becomes {} mm ({} x {} mm); \
+                     artwork.width_mm sets another",
+                    self.artwork.file,
+                    rule::PIXEL_ART_MM,
+                    round(size.x),
+                    round(size.y)
+                ));
+                (rule::PIXEL_ART_MM / longer, size)
+            }
+        };
+        let good = |v: f64| v.is_finite() && (ARTWORK_MM.0..=ARTWORK_MM.1).contains(&v);
+        if !(good(size.x) && good(size.y) && unit.is_finite() && unit > 0.0) {
+            let message = format!(
+                "the artwork would be {} x {} mm; each side must lie between {} and {} mm",
+                round(size.x),
+                round(size.y),
+                ARTWORK_MM.0,
+                ARTWORK_MM.1
+            );
+            return Err(self.impossible(&SIZE_KEYS, &message, "give artwork.width_mm"));
+        }
+        Ok((unit, size))
+    }
+
+    fn background(&self) -> Background {
+        match self.background {
+            BackgroundDraft::Clear => Background::Clear,
+            BackgroundDraft::Frame(frame) => Background::Frame(frame),
+            BackgroundDraft::Leave(Some(leave)) => Background::Leave(leave),
+            BackgroundDraft::Leave(None) => {
+                let widest =
+                    self.operations.iter().map(|op| op.cutter.diameter_mm).fold(0.0, f64::max);
+                Background::Leave(widest + rule::LEAVE_EXTRA_MM)
+            }
+        }
+    }
+
+    /// The stock; a size that is not given leaves the margin round the artwork, inside the frame.
+    fn stock(&self, artwork: DVec2, background: Background) -> Stock {
+        let frame = match background {
+            Background::Frame(frame) => frame,
+            Background::Clear | Background::Leave(_) => 0.0,
+        };
+        let margin = rule::MARGIN_MM + frame;
+        let zero = self.stock.origin.fraction();
+        let needed = match self.artwork.at {
+            Place::Center => artwork + DVec2::splat(2.0 * margin),
+            Place::LowerLeft(point) => {
+                // Left of the zero lies the part `zero` of the stock, right of it the rest.
+                let side = |room: f64, part: f64| if part > 0.0 { room / part } else { 0.0 };
+                let axis = |low: f64, high: f64, zero: f64| {
+                    side(margin - low, zero).max(side(high + margin, 1.0 - zero)).max(1.0)
+                };
+                let far = point + artwork;
+                DVec2::new(axis(point.x, far.x, zero.x), axis(point.y, far.y, zero.y))
+            }
+        };
+        let step = rule::STOCK_STEP_MM;
+        // Divided by a whole number, so that 170 stays 170.
+        let up = |v: f64| (v / step - 1e-6).ceil() / (1.0 / step).round();
+        Stock {
+            width_mm: self.stock.width_mm.unwrap_or_else(|| up(needed.x)),
+            height_mm: self.stock.height_mm.unwrap_or_else(|| up(needed.y)),
+            thickness_mm: self.stock.thickness_mm,
+            wood: self.stock.wood.clone(),
+            grain_rad: self.stock.grain_rad,
+            origin: self.stock.origin,
+        }
+    }
+
+    /// The artwork lies on the stock, the stock on the machine.
+    fn check_place(
+        &self,
+        stock: &Stock,
+        artwork: Bounds,
+        background: Background,
+    ) -> Result<(), JobError> {
+        const STOCK_KEYS: [[&str; 3]; 2] = [
+            ["stock.width_mm", "artwork.width_mm", "artwork.at"],
+            ["stock.height_mm", "artwork.height_mm", "artwork.at"],
+        ];
+        let bounds = stock.bounds();
+        let frame = match background {
+            Background::Frame(frame) => frame,
+            Background::Clear | Background::Leave(_) => 0.0,
+        };
+        let inner = bounds.grown(-frame);
+        let travel = self.machine.travel_mm.truncate();
+        for (axis, keys) in STOCK_KEYS.iter().enumerate() {
+            let name = ["X", "Y"][axis];
+            let (size, room) = (artwork.size()[axis], bounds.size()[axis]);
+            if size > room + TOUCHING_MM {
+                let message = format!(
+                    "the artwork is {} mm long in {name}, the stock only {} mm",
+                    round(size),
+                    round(room)
+                );
+                let help = "give a smaller artwork.width_mm or a larger stock";
+                return Err(self.impossible(keys, &message, help));
+            }
+            let over = (bounds.min - artwork.min)[axis].max((artwork.max - bounds.max)[axis]);
+            if over > TOUCHING_MM {
+                let message =
+                    format!("the artwork sticks out of the stock by {} mm in {name}", round(over));
+                let help = format!(
+                    "the stock reaches from {} to {} in {name}; change artwork.at",
+                    round(bounds.min[axis]),
+                    round(bounds.max[axis])
+                );
+                return Err(self.impossible(&["artwork.at", keys[0]], &message, &help));
+            }
+            let under = (inner.min - artwork.min)[axis].max((artwork.max - inner.max)[axis]);
+            if under > TOUCHING_MM {
+                let message = format!(
+                    "the frame of {frame} mm covers {} mm of the artwork in {name}",
+                    round(under)
+                );
+                let help = "take a narrower frame_mm, smaller artwork or a larger stock";
+                return Err(self.impossible(&["relief.background", keys[0]], &message, help));
+            }
+            let reach = match background {
+                Background::Clear | Background::Frame(_) => room,
+                Background::Leave(leave) => room.min(size + 2.0 * leave),
+            };
+            if reach > travel[axis] + TOUCHING_MM {
+                let message = format!(
+                    "{} can travel {} mm in {name}, but this carving needs {} mm",
+                    self.machine.title,
+                    travel[axis],
+                    round(reach)
+                );
+                let help = "give a smaller artwork.width_mm, a smaller stock, background = \"leave\", or another machine";
+                let paths = [keys[0], keys[1], "machine", "artwork.scale", "artwork.file"];
+                return Err(self.impossible(&paths, &message, help));
+            }
+        }
+        Ok(())
+    }
+
+    /// The relief's depth against the stock's thickness and the machine's Z axis.
+    fn check_depth(&self, stock: &Stock, notes: &mut Vec<String>) -> Result<(), JobError> {
+        let floor = stock.thickness_mm - self.depth_mm;
+        if floor <= 0.0 {
+            let message = format!(
+                "a relief {} mm deep does not fit into a stock {} mm thick",
+                self.depth_mm, stock.thickness_mm
+            );
+            let help = "lower relief.depth_mm or raise stock.thickness_mm; some wood must stay below the background";
+            return Err(self.impossible(
+                &["relief.depth_mm", "stock.thickness_mm"],
+                &message,
+                help,
+            ));
+        }
+        if floor < rule::THIN_FLOOR_MM {
+            notes.push(format!(
+                "only {} mm of wood stay below the background: measure the stock, and mind what lies under it",
+                round(floor)
+            ));
+        }
+        let needed = self.depth_mm + self.safe_z_mm;
+        if needed > self.machine.travel_mm.z {
+            let message = format!(
+                "{} can travel {} mm in Z, but depth_mm {} + safe_z_mm {} make {} mm",
+                self.machine.title,
+                self.machine.travel_mm.z,
+                self.depth_mm,
+                self.safe_z_mm,
+                round(needed)
+            );
+            let paths = ["relief.depth_mm", "safety.safe_z_mm", "machine"];
+            return Err(self.impossible(&paths, &message, "lower one of the two"));
+        }
+        Ok(())
+    }
+
+    fn pitch(&self, stock: &Stock) -> Result<f64, JobError> {
+        let longer = stock.width_mm.max(stock.height_mm);
+        let (finest, coarsest) = rule::PITCH_MM;
+        let pitch =
+            self.pitch_mm.unwrap_or_else(|| (longer / rule::NODES).max(finest).min(coarsest));
+        Grid::covering(stock.bounds().min, stock.width_mm, stock.height_mm, pitch).map_err(
+            |error| {
+                // Sides grow by a node each; a hundredth more is room enough.
+                let least = (stock.width_mm * stock.height_mm / Grid::MAX_NODES).sqrt() * 1.01;
+                let help = format!("pitch_mm = {} would do", (least * 1000.0).ceil() / 1000.0);
+                self.impossible(&["relief.pitch_mm", "stock.width_mm"], &error.to_string(), &help)
+            },
+        )?;
+        Ok(pitch)
+    }
+}
+
+/// File name without folders and ending.
+fn stem(file: &str) -> String {
+    let base = file.rsplit(['/', '\\']).next().unwrap_or(file);
+    let stem = base.rsplit_once('.').map_or(base, |(stem, _)| stem);
+    if stem.trim().is_empty() { "carving".to_owned() } else { stem.to_owned() }
+}
+
+/// Three decimals: enough for people, and for what a rule of thumb gives.
+pub(super) fn round(mm: f64) -> f64 {
+    (mm * 1000.0).round() / 1000.0
+}

@@ -1,0 +1,5 @@
+//! The `relievo` command.
+
+fn main() -> std::process::ExitCode {
+    relievo::cli::main()
+}

@@ -1,0 +1,336 @@
+//! Holds the carved surface against the target: gouge, leftover, and the second oracle's opinion.
+
+use super::ProgramText;
+use super::distance::Terrain;
+use super::failure::{FailureKind, Finding, Ledger};
+use super::oracle::{self, SplitMix64, Track};
+use crate::cutter::Profile;
+use crate::geom::{DVec2, DVec3, Grid, Heightfield};
+use crate::job::Job;
+use crate::stock::Block;
+use rayon::prelude::*;
+
+/// How far the two oracles may lie apart, mm (heights are stored in single precision).
+const ORACLES_MM: f64 = 0.002;
+
+/// Nodes that the second oracle sees: so many at random, and so many of the worst gouges and leftovers.
+const RANDOM_NODES: usize = 64;
+const WORST_NODES: usize = 32;
+
+/// Seed of the random nodes: the same nodes in every run.
+const SEED: u64 = 0x5EED_0F0A_4B1E;
+
+/// How leftover is spread over nodes, mm normal to the target.
+#[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize)]
+pub struct Quantiles {
+    /// Number of nodes.
+    pub nodes: usize,
+    /// Half of the nodes have less.
+    pub p50_mm: f64,
+    /// 90 % of the nodes have less.
+    pub p90_mm: f64,
+    /// 99 % of the nodes have less.
+    pub p99_mm: f64,
+    /// The most.
+    pub max_mm: f64,
+}
+
+/// What is left above the target.
+#[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize)]
+pub struct Leftover {
+    /// At all nodes of the stock.
+    pub all: Quantiles,
+    /// Where the finishing cutters come within `scallop_mm` of the target.
+    pub reachable: Quantiles,
+    /// Where only a smaller cutter would.
+    pub unreachable: Quantiles,
+    /// Fraction of all nodes where more than scallop + gouge is left above what the cutters reach.
+    pub over_fraction: f64,
+    /// The most that is left above what the cutters reach at such nodes, mm; 0 where there are none.
+    pub over_max_mm: f64,
+}
+
+/// The deepest penetration into the target.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Gouge {
+    /// How deep, mm normal to the target.
+    pub depth_mm: f64,
+    /// Where, on the carved surface, mm.
+    pub at: DVec3,
+    /// The program that did it.
+    pub program: String,
+    /// Its line.
+    pub line: u32,
+}
+
+/// A place with its amount.
+#[derive(Debug, Clone, Copy)]
+struct Spot {
+    amount: f64,
+    at: DVec3,
+}
+
+impl Spot {
+    /// The larger of both; the first one when they are equal.
+    fn worse(a: Option<Self>, b: Option<Self>) -> Option<Self> {
+        match (a, b) {
+            (Some(x), Some(y)) if y.amount > x.amount => b,
+            (None, _) => b,
+            _ => a,
+        }
+    }
+}
+
+/// Places of one kind: how many, and the worst.
+#[derive(Debug, Clone, Copy, Default)]
+struct Tally {
+    count: usize,
+    worst: Option<Spot>,
+}
+
+impl Tally {
+    fn add(&mut self, amount: f64, at: DVec3) {
+        self.count += 1;
+        self.worst = Spot::worse(self.worst, Some(Spot { amount, at }));
+    }
+
+    fn join(self, o: Self) -> Self {
+        Self { count: self.count + o.count, worst: Spot::worse(self.worst, o.worst) }
+    }
+}
+
+/// What comparing node by node found.
+pub(super) struct Held {
+    pub(super) deviation: Vec<f32>,
+    pub(super) leftover: Leftover,
+    over: Tally,
+    rows: Vec<RowFound>,
+}
+
+/// What one row of nodes shows.
+#[derive(Debug, Clone, Default)]
+struct RowFound {
+    /// All penetration, and that beyond the tolerance.
+    gouge: Option<Spot>,
+    too_deep: Tally,
+    /// Most leftover.
+    left: Option<Spot>,
+    over: Tally,
+    reachable: Vec<f32>,
+    unreachable: Vec<f32>,
+}
+
+/// Compares the carved surface with the target at every node.
+pub(super) fn hold(
+    carved: &Heightfield,
+    target: &Heightfield,
+    reach: &Heightfield,
+    job: &Job,
+) -> Held {
+    let grid = *target.grid();
+    let (terrain, reached) = (Terrain::new(target), Terrain::new(reach));
+    let tolerance = job.tolerance;
+    let limit = tolerance.scallop_mm + tolerance.gouge_mm;
+    let stock = job.stock.bounds().grown(1e-9);
+    let mut deviation = vec![0.0_f32; grid.len()];
+    let rows: Vec<RowFound> = deviation
+        .par_chunks_mut(grid.nx)
+        .enumerate()
+        .map(|(j, out)| {
+            let mut row = RowFound::default();
+            for (i, out) in out.iter_mut().enumerate() {
+                let p = grid.node(i, j);
+                let (c, t) = (f64::from(carved.at(i, j)), f64::from(target.at(i, j)));
+                let at = p.extend(c);
+                let away = if c == t { 0.0 } else { terrain.distance(at) };
+                if c < t {
+                    *out = -away as f32;
+                    row.gouge = Spot::worse(row.gouge, Some(Spot { amount: away, at }));
+                    if away > tolerance.gouge_mm {
+                        row.too_deep.add(away, at);
+                    }
+                } else {
+                    *out = away as f32;
+                }
+                if !stock.contains(p) {
+                    continue;
+                }
+                let left = f64::from(out.max(0.0));
+                row.left = Spot::worse(row.left, Some(Spot { amount: left, at }));
+                let r = f64::from(reach.at(i, j));
+                let comes_near = r - t <= tolerance.scallop_mm
+                    || terrain.distance(p.extend(r)) <= tolerance.scallop_mm;
+                if comes_near { &mut row.reachable } else { &mut row.unreachable }
+                    .push(left as f32);
+                if left > limit && c > r {
+                    let above = if r > t { reached.distance(at) } else { left };
+                    if above > limit {
+                        row.over.add(above, at);
+                    }
+                }
+            }
+            row
+        })
+        .collect();
+    let (leftover, over) = leftover(&rows);
+    Held { deviation, leftover, over, rows }
+}
+
+fn leftover(rows: &[RowFound]) -> (Leftover, Tally) {
+    let gather = |part: fn(&RowFound) -> &Vec<f32>| -> Vec<f32> {
+        rows.iter().flat_map(|r| part(r).iter().copied()).collect()
+    };
+    let mut reachable = gather(|r| &r.reachable);
+    let mut unreachable = gather(|r| &r.unreachable);
+    let mut all = [reachable.as_slice(), &unreachable].concat();
+    let over = rows.iter().map(|r| r.over).fold(Tally::default(), Tally::join);
+    let leftover = Leftover {
+        over_fraction: over.count as f64 / all.len().max(1) as f64,
+        over_max_mm: over.worst.map_or(0.0, |s| s.amount),
+        all: quantiles(&mut all),
+        reachable: quantiles(&mut reachable),
+        unreachable: quantiles(&mut unreachable),
+    };
+    (leftover, over)
+}
+
+/// Nearest-rank quantiles; reorders the values.
+fn quantiles(values: &mut [f32]) -> Quantiles {
+    let nodes = values.len();
+    if nodes == 0 {
+        return Quantiles::default();
+    }
+    // From the top down, so that each search only sees what lies below the last.
+    let mut end = nodes;
+    let mut at = |q: f64| {
+        let k = ((q * nodes as f64).ceil() as usize).clamp(1, end) - 1;
+        let value = *values[..end].select_nth_unstable_by(k, f32::total_cmp).1;
+        end = k + 1;
+        f64::from(value)
+    };
+    let (max_mm, p99_mm, p90_mm, p50_mm) = (at(1.0), at(0.99), at(0.9), at(0.5));
+    Quantiles { nodes, p50_mm, p90_mm, p99_mm, max_mm }
+}
+
+/// Finds the deepest penetration at the nodes and between them, and who did it; too deep is a failure.
+pub(super) fn judge_gouge(
+    held: &Held,
+    tracks: &[Track],
+    programs: &[ProgramText],
+    job: &Job,
+    target: &Heightfield,
+    ledger: &mut Ledger,
+) -> Option<Gouge> {
+    let terrain = Terrain::new(target);
+    let mut deepest = held.rows.iter().fold(None, |a, r| Spot::worse(a, r.gouge));
+    let mut too_deep = held.rows.iter().map(|r| r.too_deep).fold(Tally::default(), Tally::join);
+    for shift in [DVec2::new(0.5, 0.0), DVec2::new(0.0, 0.5), DVec2::new(0.5, 0.5)] {
+        let (spot, tally) = between(tracks, job, target, &terrain, shift);
+        deepest = Spot::worse(deepest, spot);
+        too_deep = too_deep.join(tally);
+    }
+    let spot = deepest?;
+    let by = oracle::lowest(tracks, &[spot.at.truncate()])[0].by;
+    let (program, line) = by.map_or(("", 0), |(t, k)| (programs[t].name, tracks[t].moves[k].line));
+    if too_deep.count > 0 {
+        let limit = job.tolerance.gouge_mm;
+        let amount = spot.amount;
+        let kind = FailureKind::Gouge;
+        ledger.note(Finding { kind, program, line, at: spot.at, amount, limit }, too_deep.count);
+    }
+    Some(Gouge { depth_mm: spot.amount, at: spot.at, program: program.to_owned(), line })
+}
+
+/// Penetration at the points that lie `shift` pitches beside the nodes.
+///
+/// A cutter between two nodes can enter the triangles there without showing at the nodes. So the
+/// moves are carved again on a shifted grid and held against the surface itself.
+fn between(
+    tracks: &[Track],
+    job: &Job,
+    target: &Heightfield,
+    terrain: &Terrain,
+    shift: DVec2,
+) -> (Option<Spot>, Tally) {
+    let grid = *target.grid();
+    let shifted = Grid {
+        nx: grid.nx - usize::from(shift.x > 0.0),
+        ny: grid.ny - usize::from(shift.y > 0.0),
+        origin: grid.origin + shift * grid.pitch_mm,
+        ..grid
+    };
+    let mut block = Block::new(&job.stock, shifted);
+    for track in tracks {
+        block.cut(&Profile::of(track.cutter), track.moves);
+    }
+    let carved = block.into_field();
+    let gouge_mm = job.tolerance.gouge_mm;
+    let (di, dj) = (usize::from(shift.x > 0.0), usize::from(shift.y > 0.0));
+    let rows: Vec<(Option<Spot>, Tally)> = (0..shifted.ny)
+        .into_par_iter()
+        .map(|j| {
+            let (mut deepest, mut too_deep) = (None, Tally::default());
+            // Halfway between these two nodes (across the cell: on its diagonal) the surface is their mean.
+            let (a, b) = (target.row(j), target.row(j + dj));
+            for (i, &c) in carved.row(j).iter().enumerate() {
+                let t = 0.5 * (f64::from(a[i]) + f64::from(b[i + di]));
+                let c = f64::from(c);
+                let known = deepest.map_or(0.0, |s: Spot| s.amount).min(gouge_mm);
+                if t - c > known {
+                    let at = shifted.node(i, j).extend(c);
+                    let amount = terrain.distance(at);
+                    deepest = Spot::worse(deepest, Some(Spot { amount, at }));
+                    if amount > gouge_mm {
+                        too_deep.add(amount, at);
+                    }
+                }
+            }
+            (deepest, too_deep)
+        })
+        .collect();
+    rows.into_iter().fold((None, Tally::default()), |(s, t), (spot, tally)| {
+        (Spot::worse(s, spot), t.join(tally))
+    })
+}
+
+/// A strict job answers for every node that its cutters reach.
+pub(super) fn judge_leftover(held: &Held, job: &Job, ledger: &mut Ledger) {
+    if let (true, Some(spot)) = (job.strict, held.over.worst) {
+        let limit = job.tolerance.scallop_mm + job.tolerance.gouge_mm;
+        let (kind, amount, at) = (FailureKind::Leftover, spot.amount, spot.at);
+        let finding = Finding { kind, program: "", line: 0, at, amount, limit };
+        ledger.note(finding, held.over.count);
+    }
+}
+
+/// The second oracle must find the carved heights at random nodes and at the worst ones.
+pub(super) fn judge_oracles(
+    held: &Held,
+    carved: &Heightfield,
+    tracks: &[Track],
+    ledger: &mut Ledger,
+) {
+    let grid = carved.grid();
+    let mut random = SplitMix64(SEED);
+    let mut places: Vec<DVec3> = (0..RANDOM_NODES)
+        .map(|_| {
+            let (i, j) = (random.below(grid.nx), random.below(grid.ny));
+            grid.node(i, j).extend(f64::from(carved.at(i, j)))
+        })
+        .collect();
+    // The worst of each row, so that they are spread out.
+    for pick in [|r: &RowFound| r.gouge, |r: &RowFound| r.left] {
+        let mut spots: Vec<Spot> = held.rows.iter().filter_map(pick).collect();
+        spots.sort_by(|a, b| b.amount.total_cmp(&a.amount));
+        places.extend(spots.iter().take(WORST_NODES).map(|s| s.at));
+    }
+    let points: Vec<DVec2> = places.iter().map(|p| p.truncate()).collect();
+    for (place, found) in places.iter().zip(oracle::lowest(tracks, &points)) {
+        let apart = (found.low - place.z).max(place.z - found.high);
+        if apart > ORACLES_MM {
+            let (kind, amount, at) = (FailureKind::Oracles, apart, *place);
+            let finding = Finding { kind, program: "", line: 0, at, amount, limit: ORACLES_MM };
+            ledger.note(finding, 1);
+        }
+    }
+}

@@ -1,0 +1,490 @@
+use super::*;
+use crate::geom::{DVec3, Ring, Tolerance};
+use crate::job::{
+    ArtworkSpec, Fit, Machine, Origin, Place as At, Profile, ReliefSpec, Selector, Stock,
+    SurfaceSpec, Wood,
+};
+use crate::outline::{OutlineLayer, Region};
+use crate::relief::grid_of;
+use crate::surface::{Mesh, raise_all};
+use proptest::prelude::*;
+use std::f64::consts::TAU;
+
+const PITCH: f64 = 0.25;
+
+/// A stock of 20 x 16 x 12 mm, zero in its lower left corner, background 8 mm down.
+fn job(layers: Vec<LayerSpec>) -> Job {
+    Job {
+        title: "Test".into(),
+        machine: Machine {
+            name: "m".into(),
+            title: "M".into(),
+            travel_mm: DVec3::splat(400.0),
+            max_rate_mm_per_min: DVec3::splat(5000.0),
+            acceleration_mm_per_s2: DVec3::splat(400.0),
+            junction_deviation_mm: 0.01,
+            arc_tolerance_mm: 0.002,
+            spindle_min_rpm: 0.0,
+            spindle_max_rpm: 24000.0,
+            spindle_dwell_s: 2.0,
+        },
+        stock: Stock {
+            width_mm: 20.0,
+            height_mm: 16.0,
+            thickness_mm: 12.0,
+            wood: Wood {
+                name: "beech".into(),
+                title: "Beech".into(),
+                flat_chip_load_mm: vec![],
+                ball_chip_load_mm: vec![],
+                stepdown_per_diameter: 0.5,
+            },
+            grain_rad: 0.0,
+            origin: Origin::LowerLeft,
+        },
+        artwork: ArtworkSpec {
+            file: "a.svg".into(),
+            fit: Fit::Own,
+            at: At::Center,
+            font_dirs: vec![],
+        },
+        relief: ReliefSpec { pitch_mm: PITCH, depth_mm: 8.0, background: Background::Clear },
+        layers,
+        operations: vec![],
+        tolerance: Tolerance::default(),
+        safe_z_mm: 5.0,
+        clearance_mm: 0.5,
+        ramp_rad: 0.1,
+        strict: false,
+        artwork_unit_mm: 1.0,
+        artwork_lower_left_mm: DVec2::ZERO,
+        artwork_size_mm: DVec2::ONE,
+        notes: vec![],
+    }
+}
+
+/// A layer that is flat at `z_mm`, with upright walls.
+fn flat(name: &str, z_mm: f64, combine: Combine) -> LayerSpec {
+    LayerSpec {
+        name: name.into(),
+        select: Selector::All,
+        surface: SurfaceSpec::Profile { profile: Profile::Chamfer, radius_mm: None },
+        base_mm: z_mm,
+        height_mm: z_mm,
+        offset_mm: 0.0,
+        combine,
+        blend_mm: 0.0,
+        feather_mm: 0.0,
+        draft_rad: 0.0,
+        slope_cap: f64::INFINITY,
+        union: false,
+        visible: false,
+    }
+}
+
+fn rectangle(x: f64, y: f64, w: f64, h: f64) -> Ring {
+    [(0.0, 0.0), (w, 0.0), (w, h), (0.0, h)].map(|(u, v)| DVec2::new(x + u, y + v)).to_vec()
+}
+
+fn figure(outer: Ring) -> Figure {
+    Figure { source: "path 'p'".into(), regions: vec![Region { outer, holes: vec![] }] }
+}
+
+/// Outlines of one layer for each list of rings.
+fn outlines(layers: Vec<Vec<Ring>>) -> Outlines {
+    let layer = |rings: Vec<Ring>| OutlineLayer {
+        name: "layer".into(),
+        figures: rings.into_iter().map(figure).collect(),
+    };
+    Outlines { layers: layers.into_iter().map(layer).collect(), notes: vec![] }
+}
+
+fn relief(job: &Job, outlines: &Outlines) -> Result<Relief, ReliefError> {
+    let grid = grid_of(job)?;
+    let raised = raise_all(outlines, &job.layers, &grid).unwrap();
+    merge(job, outlines, raised.surfaces, &grid)
+}
+
+/// Height above the background at a point that is a node.
+fn height(relief: &Relief, x: f64, y: f64) -> f64 {
+    let p = relief.target.grid().to_grid(DVec2::new(x, y)).round();
+    f64::from(relief.target.at(p.x as usize, p.y as usize)) + 8.0
+}
+
+fn near(got: f64, exact: f64) {
+    assert!((got - exact).abs() < 2e-6, "{got} is not {exact}");
+}
+
+#[test]
+fn each_operation_joins_as_tabled_inside_and_nothing_changes_outside() {
+    let table = [
+        (Combine::Base, 3.0),
+        (Combine::Add, 5.0),
+        (Combine::Max, 3.0),
+        (Combine::Min, 2.0),
+        (Combine::Subtract, -1.0),
+        (Combine::Multiply, 2.0),
+        (Combine::Replace, 3.0),
+    ];
+    let both =
+        outlines(vec![vec![rectangle(1.0, 1.0, 14.0, 14.0)], vec![rectangle(5.0, 5.0, 14.0, 6.0)]]);
+    for (combine, exact) in table {
+        let job = job(vec![flat("low", 2.0, Combine::Max), flat("up", 3.0, combine)]);
+        let relief = relief(&job, &both).unwrap();
+        near(height(&relief, 8.0, 8.0), exact);
+        near(height(&relief, 3.0, 3.0), 2.0);
+        near(height(&relief, 0.25, 0.25), 0.0);
+        // Over the bare background.
+        let alone = match combine {
+            Combine::Min | Combine::Multiply => 0.0,
+            Combine::Subtract => -3.0,
+            _ => 3.0,
+        };
+        near(height(&relief, 17.0, 8.0), alone);
+    }
+}
+
+#[test]
+fn offset_and_share_of_the_height_count() {
+    let both =
+        outlines(vec![vec![rectangle(1.0, 1.0, 14.0, 14.0)], vec![rectangle(5.0, 5.0, 6.0, 6.0)]]);
+    let up = |combine, base_mm, offset_mm| LayerSpec {
+        base_mm,
+        height_mm: 4.0,
+        offset_mm,
+        surface: SurfaceSpec::Profile { profile: Profile::Chamfer, radius_mm: Some(2.0) },
+        ..flat("up", 0.0, combine)
+    };
+    // 1 mm inside, the chamfer from 0 to 4 over 2 mm stands at 2.
+    for (combine, offset, exact) in [
+        (Combine::Add, 0.5, 5.5),
+        (Combine::Subtract, -0.5, 1.5),
+        (Combine::Max, 1.5, 3.5),
+        (Combine::Multiply, 0.0, 1.5),
+        (Combine::Multiply, 1.0, 2.25),
+    ] {
+        let job = job(vec![flat("low", 3.0, Combine::Max), up(combine, 0.0, offset)]);
+        near(height(&relief(&job, &both).unwrap(), 6.0, 8.0), exact);
+    }
+    let job = job(vec![
+        flat("low", 3.0, Combine::Max),
+        LayerSpec { height_mm: 0.0, ..up(Combine::Multiply, 0.0, 0.0) },
+    ]);
+    let fault = relief(&job, &both).unwrap_err();
+    assert!(matches!(fault, ReliefError::MultiplyByNothing { .. }));
+}
+
+#[test]
+fn a_wall_is_softened_by_the_share_of_the_cell_that_it_covers() {
+    // The cell of the node at 5 reaches from 4.875 to 5.125; walls at 4.95 and 5.05.
+    for (wall, share) in [(4.95, 0.7), (5.05, 0.3)] {
+        let art = outlines(vec![vec![rectangle(wall, 2.0, 6.0, 6.0)]]);
+        let relief = relief(&job(vec![flat("a", 3.0, Combine::Max)]), &art).unwrap();
+        near(height(&relief, 5.0, 4.0), 3.0 * share);
+        near(height(&relief, 4.75, 4.0), 0.0);
+        near(height(&relief, 5.25, 4.0), 3.0);
+    }
+}
+
+#[test]
+fn a_low_border_neither_lifts_nor_lowers_a_higher_layer() {
+    // A figure with base 0 ends on top of a block of 4: max leaves the block alone.
+    let art = outlines(vec![
+        vec![rectangle(1.0, 1.0, 14.0, 14.0)],
+        vec![rectangle(5.03, 5.07, 4.0, 4.0)],
+    ]);
+    let bump = LayerSpec { base_mm: 0.0, ..flat("bump", 2.0, Combine::Max) };
+    let relief = relief(&job(vec![flat("block", 4.0, Combine::Max), bump]), &art).unwrap();
+    for i in 8..52 {
+        for j in 8..52 {
+            near(height(&relief, f64::from(i) * PITCH, f64::from(j) * PITCH), 4.0);
+        }
+    }
+}
+
+#[test]
+fn figures_of_a_layer_that_share_a_border_leave_no_gap() {
+    let cut = [DVec2::new(7.13, 2.0), DVec2::new(8.41, 5.3), DVec2::new(6.9, 12.0)];
+    let left = vec![DVec2::new(2.0, 2.0), cut[0], cut[1], cut[2], DVec2::new(2.0, 12.0)];
+    let right = vec![cut[2], cut[1], cut[0], DVec2::new(14.0, 2.0), DVec2::new(14.0, 12.0)];
+    for combine in [Combine::Max, Combine::Replace, Combine::Add, Combine::Subtract] {
+        let art = outlines(vec![vec![left.clone(), right.clone()]]);
+        let relief = relief(&job(vec![flat("a", 3.0, combine)]), &art).unwrap();
+        let exact = if combine == Combine::Subtract { -3.0 } else { 3.0 };
+        for i in 9..56 {
+            for j in 9..48 {
+                near(height(&relief, f64::from(i) * PITCH, f64::from(j) * PITCH), exact);
+            }
+        }
+    }
+}
+
+#[test]
+fn a_feather_fades_in_from_the_outline() {
+    let art =
+        outlines(vec![vec![rectangle(1.0, 1.0, 14.0, 14.0)], vec![rectangle(4.0, 4.0, 8.0, 8.0)]]);
+    for (combine, full) in [(Combine::Replace, 5.0), (Combine::Add, 7.0), (Combine::Subtract, -3.0)]
+    {
+        let up = LayerSpec { feather_mm: 2.0, ..flat("up", 5.0, combine) };
+        let relief = relief(&job(vec![flat("low", 2.0, Combine::Max), up]), &art).unwrap();
+        for (x, weight) in [(4.0, 0.0), (4.5, 0.15625), (5.0, 0.5), (6.0, 1.0), (8.0, 1.0)] {
+            near(height(&relief, x, 8.0), 2.0 + weight * (full - 2.0));
+        }
+    }
+}
+
+#[test]
+fn a_smooth_seam_vanishes_on_both_outlines() {
+    // Both flat at 2, radius 1: raised by 1/4 where both are at least 1 mm inside, less towards each rim.
+    let art = outlines(vec![
+        vec![rectangle(2.0, 2.0, 10.0, 12.0)],
+        vec![rectangle(6.0, 2.0, 12.0, 12.0)],
+    ]);
+    let up = LayerSpec { blend_mm: 1.0, ..flat("up", 2.0, Combine::Max) };
+    let relief = relief(&job(vec![flat("low", 2.0, Combine::Max), up]), &art).unwrap();
+    for (x, bulge) in [
+        (4.0, 0.0),
+        (6.0, 0.0),
+        (6.5, 0.125),
+        (7.0, 0.25),
+        (9.0, 0.25),
+        (11.5, 0.125),
+        (12.0, 0.0),
+        (15.0, 0.0),
+    ] {
+        near(height(&relief, x, 8.0), 2.0 + bulge);
+    }
+}
+
+#[test]
+fn clear_lowers_everything_to_the_background() {
+    let relief = relief(
+        &job(vec![flat("a", 3.0, Combine::Max)]),
+        &outlines(vec![vec![rectangle(5.0, 5.0, 4.0, 4.0)]]),
+    )
+    .unwrap();
+    assert_eq!(relief.target.range(), Some((-8.0, -5.0)));
+    assert_eq!(relief.target.at(0, 0), -8.0);
+    assert!(relief.notes.is_empty());
+    assert_eq!((relief.target.grid().nx, relief.target.grid().ny), (81, 65));
+}
+
+#[test]
+fn a_frame_keeps_the_stock_along_its_edge() {
+    let mut job = job(vec![flat("wide", 3.0, Combine::Max)]);
+    job.relief.background = Background::Frame(2.5);
+    job.stock.origin = Origin::Center;
+    let art = outlines(vec![vec![rectangle(-9.0, -2.0, 12.0, 4.0)]]);
+    let relief = relief(&job, &art).unwrap();
+    let grid = relief.target.grid();
+    assert_eq!(grid.origin, DVec2::new(-10.0, -8.0));
+    for j in 0..grid.ny {
+        for i in 0..grid.nx {
+            let p = grid.node(i, j);
+            let edge = (10.0 - p.x.abs()).min(8.0 - p.y.abs());
+            let z = relief.target.at(i, j);
+            assert_eq!(edge <= 2.5, z == 0.0, "{p}: {z}");
+        }
+    }
+    assert_eq!(relief.notes.len(), 1);
+    assert!(relief.notes[0].contains("'wide'") && relief.notes[0].contains("frame"));
+
+    job.relief.background = Background::Frame(8.0);
+    let fault = super::merge(&job, &art, vec![vec![]], grid).unwrap_err();
+    assert!(matches!(fault, ReliefError::Mismatch { layer: 0, figures: 1, surfaces: 0 }));
+    let raised = raise_all(&art, &job.layers, grid).unwrap();
+    let fault = super::merge(&job, &art, raised.surfaces, grid).unwrap_err();
+    assert!(matches!(fault, ReliefError::FrameTooWide { .. }));
+}
+
+#[test]
+fn leave_cuts_only_near_the_artwork() {
+    let mut job = job(vec![flat("a", 3.0, Combine::Max), flat("b", 2.0, Combine::Max)]);
+    job.relief.background = Background::Leave(2.0);
+    let disc = |c: DVec2, r: f64| -> Ring {
+        (0..400).map(|k| DVec2::from_angle(TAU * f64::from(k) / 400.0) * r + c).collect()
+    };
+    let (a, b) = (DVec2::new(5.1, 5.1), DVec2::new(14.0, 9.0));
+    let relief = relief(&job, &outlines(vec![vec![disc(a, 3.0)], vec![disc(b, 2.0)]])).unwrap();
+    let grid = relief.target.grid();
+    for j in 0..grid.ny {
+        for i in 0..grid.nx {
+            let p = grid.node(i, j);
+            let d = (p.distance(a) - 3.0).min(p.distance(b) - 2.0);
+            let z = relief.target.at(i, j);
+            if d > 2.001 {
+                assert_eq!(z, 0.0, "{p}");
+            } else if d < 1.999 && d > 0.2 {
+                assert_eq!(z, -8.0, "{p}");
+            } else if d < -0.2 {
+                assert!(z == -5.0 || z == -6.0, "{p}: {z}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_relief_that_pokes_out_says_by_how_much_where_and_what_to_do() {
+    let art =
+        outlines(vec![vec![rectangle(2.0, 2.0, 6.0, 6.0)], vec![rectangle(4.0, 4.0, 8.0, 8.0)]]);
+    let layers = vec![flat("pad", 3.0, Combine::Max), flat("petals", 6.25, Combine::Add)];
+    let fault = relief(&job(layers), &art).unwrap_err();
+    let ReliefError::PokesOut { by_mm, x_mm, y_mm, depth_mm, .. } = &fault else {
+        panic!("{fault}")
+    };
+    near(*by_mm, 1.25);
+    assert!((4.0..=8.0).contains(x_mm) && (4.0..=8.0).contains(y_mm));
+    assert_eq!(*depth_mm, 9.25);
+    let text = fault.to_string();
+    for part in ["layer 'petals'", "1.250 mm above", "relief.depth_mm to 9.25"] {
+        assert!(text.contains(part), "{text}");
+    }
+
+    let fault = relief(
+        &job(vec![flat("g", 4.5, Combine::Subtract)]),
+        &outlines(vec![vec![rectangle(2.0, 2.0, 6.0, 6.0)]]),
+    )
+    .unwrap_err();
+    let text = fault.to_string();
+    for part in ["layer 'g'", "0.500 mm below", "at least 12.50 mm"] {
+        assert!(text.contains(part), "{text}");
+    }
+
+    let mut deep = job(vec![flat("a", 1.0, Combine::Max)]);
+    deep.relief.depth_mm = 13.0;
+    let text = relief(&deep, &outlines(vec![vec![rectangle(2.0, 2.0, 6.0, 6.0)]]))
+        .unwrap_err()
+        .to_string();
+    assert!(text.starts_with("the background lies 1.000 mm below"), "{text}");
+}
+
+#[test]
+fn a_relief_level_with_the_top_fits() {
+    let art = outlines(vec![vec![rectangle(2.0, 2.0, 6.0, 6.0)]]);
+    let relief = relief(&job(vec![flat("a", 8.0, Combine::Max)]), &art).unwrap();
+    assert_eq!(relief.target.range(), Some((-8.0, 0.0)));
+}
+
+#[test]
+fn a_mesh_joins_like_a_field() {
+    let art = outlines(vec![vec![rectangle(2.0, 2.0, 6.0, 6.0)]]);
+    let job = job(vec![LayerSpec { base_mm: 1.0, ..flat("m", 4.0, Combine::Max) }]);
+    let grid = grid_of(&job).unwrap();
+    let plane = |p: &DVec2| DVec3::new(p.x, p.y, 1.0 + 0.5 * (p.x - 2.0));
+    let vertices: Vec<DVec3> =
+        art.layers[0].figures[0].regions[0].outer.iter().map(plane).collect();
+    let mesh = |faces: Vec<[u32; 3]>| Surface::Mesh(Mesh { vertices: vertices.clone(), faces });
+    let sound = mesh(vec![[0, 1, 2], [0, 2, 3]]);
+    let relief = merge(&job, &art, vec![vec![sound]], &grid).unwrap();
+    for i in 9..32 {
+        for j in 9..32 {
+            let (x, y) = (f64::from(i) * PITCH, f64::from(j) * PITCH);
+            near(height(&relief, x, y), 1.0 + 0.5 * (x - 2.0));
+        }
+    }
+    let turned = mesh(vec![[0, 2, 1]]);
+    let fault = merge(&job, &art, vec![vec![turned]], &grid).unwrap_err();
+    assert!(matches!(&fault, ReliefError::BadMesh { .. }));
+    assert!(fault.to_string().contains("layer 'm'"));
+}
+
+#[test]
+fn hairlines_on_a_broad_figure_are_told() {
+    // A block of 16 mm2 with a tail of 10 x 0.1 mm between two rows of nodes: 1 of 17 mm2.
+    let ring = |tail: f64| -> Ring {
+        [
+            (2.0, 2.0),
+            (6.0, 2.0),
+            (6.0, 4.05),
+            (16.0, 4.05),
+            (16.0, 4.05 + tail),
+            (6.0, 4.05 + tail),
+            (6.0, 6.0),
+            (2.0, 6.0),
+        ]
+        .map(DVec2::from)
+        .to_vec()
+    };
+    let job = job(vec![LayerSpec { base_mm: 0.0, ..flat("tailed", 2.0, Combine::Max) }]);
+    let notes = relief(&job, &outlines(vec![vec![ring(0.1)]])).unwrap().notes;
+    assert_eq!(notes.len(), 1);
+    for part in ["'tailed'", "6 %", "thinner than a cell"] {
+        assert!(notes[0].contains(part), "{}", notes[0]);
+    }
+    assert!(relief(&job, &outlines(vec![vec![ring(0.9)]])).unwrap().notes.is_empty());
+}
+
+#[test]
+fn a_grid_beyond_all_memory_is_refused_with_a_cure() {
+    let mut job = job(vec![flat("a", 1.0, Combine::Max)]);
+    (job.stock.width_mm, job.stock.height_mm) = (1e6, 1e6);
+    let text = grid_of(&job).unwrap_err().to_string();
+    assert!(text.contains("raise relief.pitch_mm"), "{text}");
+}
+
+#[test]
+fn the_number_of_threads_changes_nothing() {
+    let ring = |k: f64| -> Ring {
+        let at = |i: i32| {
+            let t = TAU * f64::from(i) / 90.0;
+            DVec2::from_angle(t) * (4.0 + libm::sin(5.0 * t + k)) + DVec2::new(9.0 + k, 8.0)
+        };
+        (0..90).map(at).collect()
+    };
+    let layers = [Combine::Max, Combine::Add, Combine::Max].map(|c| LayerSpec {
+        base_mm: 0.0,
+        blend_mm: 0.5,
+        feather_mm: 1.0,
+        ..flat("l", 2.0, c)
+    });
+    let mut job = job(layers.to_vec());
+    job.relief.background = Background::Leave(1.0);
+    let art = outlines(vec![vec![ring(0.0), ring(2.0)], vec![ring(1.0)], vec![ring(3.0)]]);
+    let bits = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let relief = pool.install(|| relief(&job, &art)).unwrap();
+        relief.target.z().iter().map(|z| z.to_bits()).collect::<Vec<_>>()
+    };
+    assert_eq!(bits(1), bits(3));
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(16))]
+    /// Where cells are covered in full or not at all, in any order of the layers; at the rims the
+    /// softening of the last wall is that of the last layer.
+    #[test]
+    fn a_stack_of_max_layers_does_not_depend_on_their_order(
+        boxes in prop::collection::vec((0.0f64..8.0, 0.0f64..6.0, 3.0f64..10.0, 3.0f64..8.0, 0.0f64..4.0), 4),
+        turn in 1usize..4,
+    ) {
+        let stack = |order: &[usize]| {
+            let layers = order.iter().map(|&k| {
+                LayerSpec { base_mm: boxes[k].4 * 0.5, ..flat("l", boxes[k].4 + 1.0, Combine::Max) }
+            }).collect();
+            let rings = order.iter().map(|&k| {
+                let (x, y, w, h, _) = boxes[k];
+                vec![rectangle(x, y, w, h)]
+            }).collect();
+            relief(&job(layers), &outlines(rings)).unwrap()
+        };
+        let a = stack(&[0, 1, 2, 3]);
+        let b = stack(&[turn, (turn + 1) % 4, (turn + 2) % 4, (turn + 3) % 4]);
+        let c = stack(&[3, 2, 1, 0]);
+        let grid = *a.target.grid();
+        let mut rim = vec![false; grid.len()];
+        for &(x, y, w, h, _) in &boxes {
+            let ring = rectangle(x, y, w, h);
+            let cover = coverage([ring.as_slice()], &grid, &Window::whole(&grid));
+            for (rim, cover) in rim.iter_mut().zip(cover) {
+                *rim |= cover > COVERAGE_ROUNDING && cover < 1.0 - COVERAGE_ROUNDING;
+            }
+        }
+        prop_assert!(rim.iter().filter(|r| !**r).count() > grid.len() / 2);
+        for (k, rim) in rim.iter().enumerate() {
+            if !rim {
+                prop_assert_eq!(a.target.z()[k].to_bits(), b.target.z()[k].to_bits());
+                prop_assert_eq!(a.target.z()[k].to_bits(), c.target.z()[k].to_bits());
+            }
+        }
+    }
+}

@@ -1,0 +1,311 @@
+use super::*;
+use crate::geom::{DVec3, MoveKind};
+use crate::job::{Origin, Wood};
+use proptest::prelude::*;
+
+fn stock() -> Stock {
+    Stock {
+        width_mm: 12.0,
+        height_mm: 10.0,
+        thickness_mm: 20.0,
+        wood: Wood {
+            name: "beech".into(),
+            title: "Beech".into(),
+            flat_chip_load_mm: vec![],
+            ball_chip_load_mm: vec![],
+            stepdown_per_diameter: 0.3,
+        },
+        grain_rad: 0.0,
+        origin: Origin::LowerLeft,
+    }
+}
+
+fn block(pitch_mm: f64) -> Block {
+    Block::new(&stock(), Grid::covering(DVec2::ZERO, 12.0, 10.0, pitch_mm).unwrap())
+}
+
+fn mv(from: [f64; 3], to: [f64; 3]) -> Move {
+    let kind = MoveKind::Feed { feed_mm_per_min: 1000.0 };
+    Move { from: DVec3::from_array(from), to: DVec3::from_array(to), kind, line: 0 }
+}
+
+fn chain(points: &[[f64; 3]]) -> Vec<Move> {
+    points.windows(2).map(|p| mv(p[0], p[1])).collect()
+}
+
+/// The lowest that the cutter, cut off at the radius `reach`, comes at `p`: the best of many places along each
+/// move, then refined by ternary search.
+fn searched(profile: &Profile, reach: f64, moves: &[Move], p: DVec2) -> f64 {
+    let mut lowest = 0.0_f64;
+    for m in moves {
+        let z = |t: f64| {
+            let at = m.from + (m.to - m.from) * t;
+            let d = at.truncate().distance(p);
+            let h = profile.height_at(d.min(profile.radius_mm())).unwrap();
+            if d <= reach { at.z + h } else { f64::INFINITY }
+        };
+        let n = 400.0;
+        let best = (0..=400).map(f64::from).min_by(|a, b| z(a / n).total_cmp(&z(b / n))).unwrap();
+        let (mut a, mut b) = (((best - 1.0) / n).max(0.0), ((best + 1.0) / n).min(1.0));
+        lowest = lowest.min(z(best / n)).min(z(a)).min(z(b));
+        for _ in 0..60 {
+            let (c, d) = (a + (b - a) / 3.0, b - (b - a) / 3.0);
+            lowest = lowest.min(z(c)).min(z(d));
+            // Outside the disc counts as high; towards the best sample is always inside.
+            if z(c) < z(d) || (z(c) == z(d) && best / n <= c) { b = d } else { a = c }
+        }
+    }
+    lowest
+}
+
+/// Holds every node of the block against the search. A node on a rim, where the height jumps, may fall on
+/// either side.
+fn check(block: &Block, profile: &Profile, moves: &[Move]) {
+    let grid = *block.field().grid();
+    let r = profile.radius_mm();
+    for j in 0..grid.ny {
+        for i in 0..grid.nx {
+            let got = f64::from(block.field().at(i, j));
+            let p = grid.node(i, j);
+            let low = searched(profile, r + 1e-4, moves, p);
+            let high = searched(profile, r - 1e-4, moves, p);
+            assert!(
+                got >= low - 2e-5 && got <= high + 2e-6,
+                "node {p}: carved {got}, searched {low} to {high}"
+            );
+        }
+    }
+}
+
+const BALL: Profile = Profile::Ball { radius_mm: 1.5 };
+const FLAT: Profile = Profile::Flat { radius_mm: 1.6 };
+
+#[test]
+fn single_moves_sweep_their_analytic_volume() {
+    let moves = [
+        mv([3.0, 3.0, -1.0], [9.0, 3.0, -1.0]),
+        mv([3.0, 3.0, -0.5], [9.0, 6.5, -2.5]),
+        mv([9.0, 3.0, -0.5], [7.5, 7.0, -6.5]),
+        mv([5.0, 8.0, -3.0], [5.0, 2.0, 1.0]),
+        mv([6.0, 5.0, 2.0], [6.0, 5.0, -3.0]),
+        mv([6.0, 5.0, -3.0], [6.0, 5.0, 2.0]),
+        mv([0.3, 0.2, -1.0], [0.35, 0.22, -1.4]),
+        mv([-2.0, 4.0, -1.0], [20.0, 5.0, -2.0]),
+    ];
+    for m in moves {
+        for profile in [BALL, FLAT] {
+            let mut b = block(0.25);
+            let contact = b.cut(&profile, &[m])[0];
+            check(&b, &profile, &[m]);
+            assert!(contact.deepest_mm > 0.3, "{m:?}");
+            let lowest = b.field().range().unwrap().0;
+            assert!((contact.deepest_mm + lowest).abs() < 1e-6, "flat wood: removed = depth");
+        }
+    }
+}
+
+#[test]
+fn a_level_ball_leaves_a_half_pipe() {
+    let mut b = block(0.1);
+    b.cut(&BALL, &[mv([2.0, 5.0, -1.0], [10.0, 5.0, -1.0])]);
+    for k in 0..13_usize {
+        let y = k as f64 * 0.1;
+        let z = (-1.0 + 1.5 - (2.25 - y * y).sqrt()).min(0.0);
+        let got = b.field().height_at(DVec2::new(6.0, 5.0 + y)).unwrap();
+        assert!((got - z).abs() < 1e-6, "{y}: {got} {z}");
+    }
+}
+
+#[test]
+fn a_ramped_ball_leaves_a_tilted_cylinder() {
+    // A ball along a 45 degree line sweeps a cylinder; its cross-section seen in plan is stretched by sqrt 2.
+    let mut b = block(0.1);
+    b.cut(&BALL, &[mv([1.0, 5.0, 0.5], [9.0, 5.0, -7.5])]);
+    for y in [0.0, 0.5, 1.0] {
+        let axis = 1.5 - 4.0 + 0.5; // height of the ball's centre above x = 5
+        let z = axis - std::f64::consts::SQRT_2 * (2.25_f64 - y * y).sqrt();
+        let got = b.field().height_at(DVec2::new(5.0, 5.0 + y)).unwrap();
+        assert!((got - z).abs() < 2e-6, "{y}: {got} {z}");
+    }
+}
+
+#[test]
+fn chains_of_any_turn_equal_a_search() {
+    let zigzag = chain(&[
+        [2.0, 2.0, -1.0],
+        [4.0, 2.5, -2.0],
+        [6.0, 2.0, -0.5],
+        [6.1, 2.1, -0.5],
+        [6.1, 6.0, -0.5],
+        [4.0, 6.0, -2.5],
+        [8.0, 6.0, -1.0],
+        [3.0, 6.0, -1.0],
+        [3.0, 6.0, -3.0],
+        [3.0, 8.0, -3.0],
+        [3.0, 8.0, 1.0],
+    ]);
+    for profile in [BALL, FLAT] {
+        let mut b = block(0.25);
+        b.cut(&profile, &zigzag);
+        check(&b, &profile, &zigzag);
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 96, ..ProptestConfig::default() })]
+
+    /// A chain handed out joint by joint takes away exactly what its moves take away one by one,
+    /// in either direction and in any order.
+    #[test]
+    fn a_chain_equals_its_moves_alone_in_any_order(
+        points in prop::collection::vec(
+            (0.0f64..12.0, 0.0f64..10.0, -4.0f64..0.3, 0u8..4), 2..24),
+        step in prop_oneof![Just(0.05), Just(0.4), Just(1.0)],
+        ball: bool,
+    ) {
+        // Short steps, some of them level, some collinear, some vertical.
+        let mut path = vec![[6.0, 5.0, -1.0]];
+        for (x, y, z, kind) in points {
+            let last = *path.last().unwrap();
+            let next = match kind {
+                0 => [last[0] + step * (x - 6.0) * 0.3, last[1] + step * (y - 5.0) * 0.3, last[2]],
+                1 if path.len() > 1 => {
+                    let before = path[path.len() - 2];
+                    [2.0 * last[0] - before[0], 2.0 * last[1] - before[1], 2.0 * last[2] - before[2]]
+                }
+                2 => [last[0], last[1], z],
+                _ => [last[0] + step * (x - 6.0) * 0.3, last[1] + step * (y - 5.0) * 0.3, last[2] + step * (z + 2.0)],
+            };
+            path.push([next[0].clamp(-1.0, 13.0), next[1].clamp(-1.0, 11.0), next[2].clamp(-5.0, 1.0)]);
+        }
+        let moves = chain(&path);
+        // A radius that puts no node on a rim.
+        let profile = if ball { BALL } else { Profile::Flat { radius_mm: 1.6173 } };
+        let mut whole = block(0.2);
+        whole.cut(&profile, &moves);
+        let mut alone = block(0.2);
+        alone.cut_alone(&profile, &moves, |_| true);
+        let mut backward = block(0.2);
+        for m in moves.iter().rev() {
+            backward.cut(&profile, &[Move { from: m.to, to: m.from, ..*m }]);
+        }
+        for (k, ((a, b), c)) in whole.field().z().iter().zip(alone.field().z())
+            .zip(backward.field().z()).enumerate()
+        {
+            prop_assert!((a - b).abs() < 2e-6, "node {k}: chain {a}, alone {b}");
+            prop_assert!((a - c).abs() < 2e-6, "node {k}: chain {a}, backward {c}");
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 64, ..ProptestConfig::default() })]
+
+    /// Short moves with small turns, as fitted rasters and arcs have them: their wedges are thin.
+    #[test]
+    fn a_gently_winding_chain_equals_its_moves_alone(
+        turns in prop::collection::vec((-0.2f64..0.2, -0.3f64..0.3), 20..60),
+        heading in 0.0f64..6.3,
+        ball: bool,
+    ) {
+        let (mut heading, mut slope) = (heading, 0.0_f64);
+        let mut path = vec![[6.0, 5.0, -2.0]];
+        for (turn, bend) in turns {
+            heading += turn;
+            slope = (slope + bend).clamp(-2.0, 2.0);
+            let [x, y, z] = *path.last().unwrap();
+            let step = 0.12;
+            path.push([x + step * libm::cos(heading), y + step * libm::sin(heading), z + step * slope]);
+        }
+        let moves = chain(&path);
+        let profile = if ball { BALL } else { Profile::Flat { radius_mm: 1.6173 } };
+        let mut whole = block(0.1);
+        whole.cut(&profile, &moves);
+        let mut alone = block(0.1);
+        alone.cut_alone(&profile, &moves, |_| true);
+        for (k, (a, b)) in whole.field().z().iter().zip(alone.field().z()).enumerate() {
+            prop_assert!((a - b).abs() < 2e-6, "node {k}: chain {a}, alone {b}");
+        }
+    }
+}
+
+#[test]
+fn the_result_does_not_hang_on_the_number_of_threads() {
+    let moves: Vec<Move> = (0..200)
+        .map(|k| {
+            let y = f64::from(k) * 0.05;
+            mv([0.5, y, -1.0 - 0.3 * libm::sin(y)], [11.0, 10.0 - y, -2.0])
+        })
+        .collect();
+    let run = |threads| {
+        rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap().install(|| {
+            let mut b = block(0.05);
+            let contacts = b.cut(&BALL, &moves);
+            (b, contacts)
+        })
+    };
+    assert_eq!(run(1), run(2));
+}
+
+#[test]
+fn contacts_say_what_each_move_met() {
+    let mut b = block(0.1);
+    let moves = chain(&[[2.0, 5.0, 5.0], [2.0, 5.0, -2.0], [9.0, 5.0, -2.0], [9.0, 5.0, 5.0]]);
+    let c = b.cut(&FLAT, &moves);
+    assert_eq!(c[0], Contact { deepest_mm: 2.0, engaged_mm: 2.0 });
+    assert_eq!(c[1], Contact { deepest_mm: 2.0, engaged_mm: 2.0 });
+    assert_eq!(c[2], Contact::default(), "the retract runs in what is cut already");
+    let through = Move { kind: MoveKind::Rapid, ..mv([6.0, 0.0, -0.5], [6.0, 10.0, -0.5]) };
+    assert_eq!(b.cut(&FLAT, &[through])[0].deepest_mm, 0.5);
+    let above = mv([0.0, 0.0, 0.0], [12.0, 10.0, 0.0]);
+    assert_eq!(b.cut(&BALL, &[above])[0], Contact::default());
+}
+
+#[test]
+fn a_move_alone_is_credited_with_the_wood_in_front_of_it() {
+    // Down a step, then on: the front half of the disc belongs to the descent only when it stands alone.
+    let moves = chain(&[[4.0, 5.0, 0.0], [4.2, 5.0, -2.0], [8.0, 5.0, -2.0]]);
+    let mut b = block(0.1);
+    let c = b.cut_alone(&FLAT, &moves, |k| k == 0);
+    assert_eq!(c[0].deepest_mm, 2.0);
+    assert_eq!(c[0].engaged_mm, 2.0);
+}
+
+#[test]
+fn the_highest_wood_under_a_disc() {
+    let mut b = block(0.1);
+    b.cut(&FLAT, &chain(&[[6.0, 5.0, -2.0], [8.0, 5.0, -2.0]]));
+    assert_eq!(b.highest_under(1.0, DVec2::new(7.0, 5.0)), -2.0);
+    assert_eq!(b.highest_under(2.0, DVec2::new(7.0, 5.0)), 0.0);
+    assert_eq!(b.highest_under(1.0, DVec2::new(-5.0, 5.0)), f64::NEG_INFINITY);
+    assert_eq!(b.highest_under(1.0, DVec2::new(-0.9, 5.0)), 0.0);
+}
+
+#[test]
+fn a_shank_wider_than_the_slot_touches_its_rim() {
+    let mut b = block(0.1);
+    let slot = mv([3.0, 5.0, -4.0], [9.0, 5.0, -4.0]);
+    b.cut(&FLAT, &[slot]);
+    let touch = b.touch(2.0, 3.0, &slot).unwrap();
+    assert!((touch.depth_mm - 1.0).abs() < 1e-6);
+    assert!(b.touch(1.5, 3.0, &slot).is_none(), "a thinner shank stays in the slot");
+    assert!(b.touch(2.0, 4.0, &slot).is_none(), "a higher shank stays above the wood");
+}
+
+#[test]
+fn a_retract_from_the_end_of_a_cut_meets_no_wood() {
+    // Nodes just on the rim of a flat cutter at the end of its cut.
+    let grid = Grid::covering(DVec2::ZERO, 60.0, 40.0, 0.1).unwrap();
+    for end in [50.4, 23.7, 31.1] {
+        let at = |x: f64, z: f64| DVec3::new(x, 20.1, z);
+        let feed = MoveKind::Feed { feed_mm_per_min: 500.0 };
+        let moves = [
+            Move { from: at(10.0, -1.533), to: at(end, -1.533), kind: feed, line: 1 },
+            Move { from: at(end, -1.533), to: at(end, 5.0), kind: MoveKind::Rapid, line: 2 },
+        ];
+        let mut block = Block::from_field(&stock(), Heightfield::flat(grid, 0.0));
+        let met = block.cut(&Profile::Flat { radius_mm: 1.5 }, &moves);
+        assert!(met[0].deepest_mm > 1.5);
+        assert_eq!(met[1], Contact::default(), "{end}");
+    }
+}

@@ -1,0 +1,119 @@
+//! Chains -> moves: rapids, entries, feeds, and coordinates on the grid of the written program.
+
+use super::ramp::ramp_onto;
+use crate::geom::{DVec2, DVec3, Move, MoveKind};
+use crate::job::{Job, Machine, Operation};
+
+/// Gap above the wood where a ramp begins; down to it the cutter feeds straight through air, mm.
+const RAMP_GAP_MM: f64 = 0.2;
+
+/// Three decimals, z rounded up: the program's text holds exactly what was planned.
+pub(super) fn on_program_grid(p: DVec3) -> DVec3 {
+    let near = |v: f64| (v * 1000.0).round() / 1000.0;
+    DVec3::new(near(p.x), near(p.y), (p.z * 1000.0 - 1e-6).ceil() / 1000.0)
+}
+
+/// The moves of one operation in the making.
+pub(super) struct Emitter<'a> {
+    job: &'a Job,
+    operation: &'a Operation,
+    moves: Vec<Move>,
+    /// Chains left out because they have no room to ramp.
+    skipped: usize,
+}
+
+impl<'a> Emitter<'a> {
+    pub(super) fn new(job: &'a Job, operation: &'a Operation) -> Self {
+        Self { job, operation, moves: Vec::new(), skipped: 0 }
+    }
+
+    /// The moves so far: they start and end at safe Z.
+    pub(super) fn moves(&self) -> &[Move] {
+        &self.moves
+    }
+
+    /// Number of chains left out.
+    pub(super) fn skipped(&self) -> usize {
+        self.skipped
+    }
+
+    pub(super) fn into_moves(self) -> Vec<Move> {
+        self.moves
+    }
+
+    /// Goes to the start of the chain at safe Z, enters, cuts, retracts. `wood_mm`: the highest wood under the
+    /// cutter at the start. A chain without room to ramp is only counted.
+    pub(super) fn chain(&mut self, chain: &[DVec3], wood_mm: f64) {
+        let ramp_z =
+            (wood_mm + RAMP_GAP_MM).max(chain[0].z).min(self.job.safe_z_mm.max(chain[0].z));
+        let Some(entry) = ramp_onto(chain, ramp_z, libm::tan(self.job.ramp_rad)) else {
+            self.skipped += 1;
+            return;
+        };
+        let above = on_program_grid(entry[0].with_z(self.job.safe_z_mm));
+        match self.moves.last() {
+            Some(last) => self.rapid(last.to, above),
+            None => self.moves.reserve(chain.len()),
+        }
+        let low = (wood_mm.max(chain[0].z) + self.job.clearance_mm).min(above.z);
+        let low = on_program_grid(above.with_z(low));
+        self.rapid(above, low);
+        let mut at = low;
+        for &p in entry.iter().chain(&chain[1..]) {
+            at = self.feed(at, on_program_grid(p));
+        }
+        self.rapid(at, at.with_z(above.z));
+    }
+
+    fn rapid(&mut self, from: DVec3, to: DVec3) {
+        if from != to {
+            self.moves.push(Move { from, to, kind: MoveKind::Rapid, line: 0 });
+        }
+    }
+
+    fn feed(&mut self, from: DVec3, to: DVec3) -> DVec3 {
+        if from != to {
+            let feed_mm_per_min = feed(to - from, self.operation, &self.job.machine);
+            self.moves.push(Move { from, to, kind: MoveKind::Feed { feed_mm_per_min }, line: 0 });
+        }
+        to
+    }
+}
+
+/// Speed of a straight feed move, mm/min: the operation's, but so that it goes down no faster than the plunge limit
+/// and no axis exceeds its highest rate; whole numbers (tens above 200), so that speeds repeat.
+fn feed(way: DVec3, operation: &Operation, machine: &Machine) -> f64 {
+    let length = way.length();
+    let mut most = operation.feed_mm_per_min;
+    for axis in 0..3 {
+        if way[axis] != 0.0 {
+            most = most.min(machine.max_rate_mm_per_min[axis] * length / way[axis].abs());
+        }
+    }
+    if way.z < 0.0 {
+        most = most.min(operation.plunge_mm_per_min * length / -way.z);
+    }
+    if most == operation.feed_mm_per_min {
+        return most;
+    }
+    let step = if most > 200.0 { 10.0 } else { 1.0 };
+    let whole = ((most + 1e-9) / step).floor() * step;
+    if whole > 0.0 { whole } else { most }
+}
+
+/// Time to lift at `a`, travel and come down to `b` and ramp in again, s; accelerations left out.
+pub(super) fn lift_seconds(job: &Job, operation: &Operation, a: DVec3, b: DVec3) -> f64 {
+    let rate = job.machine.max_rate_mm_per_min;
+    let vertical = (job.safe_z_mm - a.z).max(0.0) + (job.safe_z_mm - b.z).max(0.0);
+    let across: DVec2 = (b - a).truncate();
+    let ramp = (job.clearance_mm + RAMP_GAP_MM) / libm::tan(job.ramp_rad);
+    60.0 * (vertical / rate.z
+        + across.length() / rate.x.min(rate.y)
+        + ramp / operation.feed_mm_per_min)
+}
+
+/// Time to feed along points, s; the limits on steep pieces left out.
+pub(super) fn feed_seconds(operation: &Operation, points: &[DVec3]) -> f64 {
+    let length: f64 = points.windows(2).map(|e| e[0].distance(e[1])).sum();
+    60.0 * length / operation.feed_mm_per_min
+}

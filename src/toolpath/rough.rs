@@ -1,0 +1,133 @@
+//! Roughing: levels of constant Z, parallel passes on each, never inside the allowance.
+
+use super::chain::{Span, chains};
+use super::emit::{Emitter, feed_seconds, lift_seconds};
+use super::rows::{Row, rows};
+use super::trace::{DROP_MM, Sample, Tracer};
+use super::{Site, ToolpathError};
+use crate::cutter::Profile;
+use crate::geom::{DVec2, DVec3};
+use crate::offset::Dropper;
+use crate::stock::Block;
+use rayon::prelude::*;
+
+/// Shortest span worth an entry, as a fraction of the cutter's diameter.
+const SHORTEST_SPAN_PER_DIAMETER: f64 = 0.3;
+/// Wood lower than this above a level is left to later operations, mm.
+const FILM_MM: f64 = 0.01;
+
+/// The numbers of a roughing operation.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Rough {
+    pub(super) leave_mm: f64,
+    pub(super) stepdown_mm: f64,
+    pub(super) stepover_mm: f64,
+    pub(super) angle_rad: f64,
+}
+
+/// A row with what is known along it, at the same places.
+struct Survey {
+    row: Row,
+    /// Lowest height that the allowance leaves to the tip.
+    allowed: Vec<Sample>,
+    /// Highest wood under the cutter before this operation.
+    wood_mm: Vec<f64>,
+}
+
+/// Plans the levels from the top to the lowest height that the allowance leaves, in equal steps of at most
+/// `stepdown_mm`, and takes them out of `block`. The moves go to `out`.
+pub(super) fn rough(
+    site: &Site,
+    cut: &Rough,
+    block: &mut Block,
+    out: &mut Emitter,
+) -> Result<(), ToolpathError> {
+    let profile = Profile::of(&site.operation.cutter);
+    let inflated = profile.inflated(cut.leave_mm);
+    let dropper = Dropper::new(site.target, inflated);
+    let pitch = site.target.grid().pitch_mm;
+    let tracer = Tracer::new(
+        |p: DVec2| dropper.drop(p) + cut.leave_mm,
+        inflated,
+        pitch,
+        site.job.tolerance.fit_mm,
+    );
+    let bounds = site.job.stock.bounds();
+    site.refuse_endless(cut.angle_rad, cut.stepover_mm, tracer.spacing_mm())?;
+    let surveys: Vec<Survey> = rows(&bounds, cut.angle_rad, cut.stepover_mm)
+        .into_par_iter()
+        .map(|row| {
+            let allowed = tracer.even(row.from, row.to);
+            let wood = |s: &Sample| block.highest_under(profile.radius_mm(), point(&row, s.s));
+            let wood_mm = if site.fresh {
+                vec![0.0; allowed.len()]
+            } else {
+                allowed.iter().map(wood).collect()
+            };
+            Survey { row, allowed, wood_mm }
+        })
+        .collect();
+    let lowest = surveys.iter().flat_map(|s| &s.allowed).map(|p| p.z).fold(f64::INFINITY, f64::min);
+    if !lowest.is_finite() || lowest > -FILM_MM {
+        return Ok(());
+    }
+    let levels = (-lowest / cut.stepdown_mm - 1e-9).ceil().max(1.0) as usize;
+    for k in 1..=levels {
+        let z = lowest * (k as f64 / levels as f64);
+        let spans =
+            surveys.iter().map(|s| spans(s, z, site.operation.cutter.diameter_mm)).collect();
+        let link = |a: DVec3, b: DVec3| {
+            let direct = [a, b];
+            if feed_seconds(site.operation, &direct) > lift_seconds(site.job, site.operation, a, b)
+            {
+                return None;
+            }
+            let way = tracer.even(a.truncate(), b.truncate());
+            way.iter().all(|p| is_allowed(p, z)).then(Vec::new)
+        };
+        let before = out.moves().len();
+        for chain in chains(spans, link) {
+            let wood = block.highest_under(profile.radius_mm(), chain[0].truncate());
+            out.chain(&chain, wood);
+        }
+        if k < levels || site.later {
+            block.cut(&profile, &out.moves()[before..]);
+        }
+    }
+    Ok(())
+}
+
+fn point(row: &Row, s: f64) -> DVec2 {
+    row.from + (row.to - row.from).normalize_or_zero() * s
+}
+
+/// True where the tip may be at height `z`.
+fn is_allowed(sample: &Sample, z: f64) -> bool {
+    sample.z <= z + 0.5 * DROP_MM
+}
+
+/// The spans of a row at level `z`: the tip may be there, and there is wood to remove.
+fn spans(survey: &Survey, z: f64, diameter_mm: f64) -> Vec<Span> {
+    let mut spans = Vec::new();
+    let mut open: Option<(f64, f64)> = None;
+    let mut close = |open: &mut Option<(f64, f64)>| {
+        if let Some((from, to)) = open.take()
+            && to - from >= SHORTEST_SPAN_PER_DIAMETER * diameter_mm
+        {
+            spans.push([from, to].map(|s| point(&survey.row, s).extend(z)).to_vec());
+        }
+    };
+    for (sample, &wood) in survey.allowed.iter().zip(&survey.wood_mm) {
+        if !is_allowed(sample, z) {
+            close(&mut open);
+        } else if wood > z + FILM_MM {
+            // A gap without wood shorter than the cutter is not worth lifting.
+            if open.is_some_and(|(_, to)| sample.s - to > diameter_mm) {
+                close(&mut open);
+            }
+            open = Some((open.map_or(sample.s, |(from, _)| from), sample.s));
+        }
+    }
+    close(&mut open);
+    spans
+}

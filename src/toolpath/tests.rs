@@ -1,0 +1,450 @@
+//! Laws of whole plans, held against brute force that shares no code with the planner.
+
+use super::fit::fit;
+use super::fixture::{Bump, cutter, job, raster, relief, rough};
+use super::trace::{Sample, Tracer};
+use super::*;
+use crate::cutter::Profile;
+use crate::geom::{DVec2, DVec3};
+use crate::job::{CutterShape, Stepover};
+use crate::offset::Dropper;
+use proptest::prelude::*;
+
+/// Distance from `c` to the triangle.
+fn distance_to_triangle(c: DVec3, t: [DVec3; 3]) -> f64 {
+    let n = (t[1] - t[0]).cross(t[2] - t[0]).normalize();
+    let foot = c - n * n.dot(c - t[0]);
+    let inside = (0..3).all(|k| n.dot((t[(k + 1) % 3] - t[k]).cross(foot - t[k])) >= 0.0);
+    if inside {
+        return n.dot(c - t[0]).abs();
+    }
+    let to_edge = |a: DVec3, b: DVec3| {
+        let d = b - a;
+        c.distance(a + d * ((c - a).dot(d) / d.length_squared()).clamp(0.0, 1.0))
+    };
+    (0..3).map(|k| to_edge(t[k], t[(k + 1) % 3])).fold(f64::INFINITY, f64::min)
+}
+
+/// Highest point of the triangle within the disc of radius `r` round `c`.
+fn highest_in_disc(c: DVec2, r: f64, t: [DVec3; 3]) -> f64 {
+    let mut best = f64::NEG_INFINITY;
+    for k in 0..3 {
+        let (a, b) = (t[k], t[(k + 1) % 3]);
+        if a.truncate().distance(c) <= r {
+            best = best.max(a.z);
+        }
+        let (d, m) = ((b - a).truncate(), a.truncate() - c);
+        let (qa, qb, qc) = (d.length_squared(), m.dot(d), m.length_squared() - r * r);
+        let root = (qb * qb - qa * qc).max(0.0).sqrt();
+        for u in [(-qb - root) / qa, (-qb + root) / qa] {
+            if (0.0..=1.0).contains(&u) && qb * qb >= qa * qc {
+                best = best.max(a.z + (b.z - a.z) * u);
+            }
+        }
+    }
+    let n = (t[1] - t[0]).cross(t[2] - t[0]);
+    let uphill = -n.truncate() / n.z;
+    if uphill.length() > 0.0 {
+        let top = c + uphill.normalize() * r;
+        let side = |k: usize| {
+            let (a, b) = (t[k].truncate(), t[(k + 1) % 3].truncate());
+            (b - a).perp_dot(top - a)
+        };
+        if (0..3).all(|k| side(k) >= 0.0) {
+            best = best.max(t[0].z + uphill.dot(top - t[0].truncate()));
+        }
+    }
+    best
+}
+
+/// The triangles of the field near `p`, counter-clockwise.
+fn triangles(field: &Heightfield, p: DVec2, r: f64) -> Vec<[DVec3; 3]> {
+    let grid = field.grid();
+    let node = |i: usize, j: usize| grid.node(i, j).extend(f64::from(field.at(i, j)));
+    let (low, high) = (grid.to_grid(p - DVec2::splat(r)), grid.to_grid(p + DVec2::splat(r)));
+    let range = |a: f64, b: f64, n: usize| {
+        (a.floor().max(0.0) as usize)..(b.ceil().max(0.0) as usize).min(n - 1)
+    };
+    let mut out = Vec::new();
+    for j in range(low.y, high.y, grid.ny) {
+        for i in range(low.x, high.x, grid.nx) {
+            let (a, b) = (node(i, j), node(i + 1, j + 1));
+            out.push([a, node(i + 1, j), b]);
+            out.push([a, b, node(i, j + 1)]);
+        }
+    }
+    out
+}
+
+/// True when the cutter, shrunk by `slack` all round, enters the field at this place of its tip.
+fn gouges(field: &Heightfield, profile: &Profile, tip: DVec3, slack: f64) -> bool {
+    match *profile {
+        Profile::Ball { radius_mm: r } => {
+            let c = tip + DVec3::Z * r;
+            let over = field.height_at(
+                c.truncate().clamp(field.grid().bounds().min, field.grid().bounds().max),
+            );
+            over.is_some_and(|z| z > c.z)
+                || triangles(field, c.truncate(), r)
+                    .iter()
+                    .any(|&t| distance_to_triangle(c, t) < r - slack)
+        }
+        Profile::Flat { radius_mm: r } => triangles(field, tip.truncate(), r)
+            .iter()
+            .any(|&t| highest_in_disc(tip.truncate(), r - slack, t) > tip.z + slack),
+    }
+}
+
+/// Places along a move, at most 0.02 mm apart, ends included.
+fn places(m: &Move) -> impl Iterator<Item = DVec3> + use<> {
+    let (from, way) = (m.from, m.to - m.from);
+    let n = (way.length() / 0.02).ceil().max(1.0);
+    (0..=n as usize).map(move |k| from + way * (k as f64 / n))
+}
+
+fn plan_quietly(job: &Job, target: &Heightfield) -> Vec<Toolpath> {
+    let mut seen = 0;
+    let paths = plan(job, target, &mut |_| seen += 1).unwrap();
+    assert!(seen >= job.operations.len());
+    paths
+}
+
+/// No place of any move enters the target by more than 0.01 mm, normal to it.
+fn assert_no_gouge(paths: &[Toolpath], target: &Heightfield) {
+    for path in paths {
+        let profile = Profile::of(&path.cutter);
+        for (k, m) in path.moves.iter().enumerate() {
+            for tip in places(m) {
+                assert!(
+                    !gouges(target, &profile, tip, 0.01),
+                    "{} move {k} gouges at {tip}",
+                    path.name
+                );
+            }
+        }
+    }
+}
+
+fn bumps(size: DVec2, depth: f64) -> impl Strategy<Value = Vec<Bump>> {
+    let bump = (0.0..=1.0, 0.0..=1.0, 0.4..4.0f64, 0.2..1.0f64, any::<bool>()).prop_map(
+        move |(u, v, radius_mm, h, wall)| Bump {
+            at: size * DVec2::new(u, v),
+            radius_mm,
+            height_mm: h * depth,
+            wall,
+        },
+    );
+    prop::collection::vec(bump, 1..5)
+}
+
+const SIZE: DVec2 = DVec2::new(12.0, 9.0);
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 10, ..ProptestConfig::default() })]
+
+    #[test]
+    fn a_ball_raster_never_gouges(
+        bumps in bumps(SIZE, 3.0), angle in prop::sample::select(vec![0.0, 30.0, 90.0]),
+        frame in prop::sample::select(vec![0.0, 1.5]), diameter in 1.0f64..3.5,
+    ) {
+        let op = raster(cutter(CutterShape::Ball, diameter), Stepover::Plan(0.7), angle);
+        let job = job(SIZE.x, SIZE.y, 10.0, 0.25, vec![op]);
+        let target = relief(&job, 3.0, frame, &bumps);
+        assert_no_gouge(&plan_quietly(&job, &target), &target);
+    }
+
+    #[test]
+    fn a_flat_raster_never_gouges(
+        bumps in bumps(SIZE, 3.0), angle in prop::sample::select(vec![0.0, 30.0, 90.0]),
+        frame in prop::sample::select(vec![0.0, 1.5]), diameter in 1.0f64..3.5,
+    ) {
+        let op = raster(cutter(CutterShape::Flat, diameter), Stepover::Plan(0.7), angle);
+        let job = job(SIZE.x, SIZE.y, 10.0, 0.25, vec![op]);
+        let target = relief(&job, 3.0, frame, &bumps);
+        assert_no_gouge(&plan_quietly(&job, &target), &target);
+    }
+
+    #[test]
+    fn roughing_stays_out_of_the_allowance(
+        bumps in bumps(SIZE, 4.0), leave in 0.1f64..0.8, shape in prop::sample::select(vec![CutterShape::Flat, CutterShape::Ball]),
+        angle in prop::sample::select(vec![0.0, 30.0, 90.0]),
+    ) {
+        let mut op = rough(cutter(shape, 3.0), leave, 1.5);
+        if let OperationKind::Rough { angle_rad, .. } = &mut op.kind {
+            *angle_rad = f64::to_radians(angle);
+        }
+        let job = job(SIZE.x, SIZE.y, 10.0, 0.25, vec![op]);
+        let target = relief(&job, 4.0, 0.0, &bumps);
+        let mut notes = Vec::new();
+        let Ok(paths) = plan(&job, &target, &mut |e| notes.push(e)) else { return Ok(()) };
+        let wide = Profile::of(&paths[0].cutter).inflated(leave);
+        for m in &paths[0].moves {
+            for tip in places(m) {
+                let lowered = tip - DVec3::Z * leave;
+                prop_assert!(!gouges(&target, &wide, lowered, 0.003), "allowance entered at {}", tip);
+            }
+        }
+    }
+
+    #[test]
+    fn roughing_and_finishing_hold_the_laws_of_a_path(
+        bumps in bumps(SIZE, 4.0), frame in prop::sample::select(vec![0.0, 1.5]),
+    ) {
+        let job = job(SIZE.x, SIZE.y, 10.0, 0.25, vec![
+            rough(cutter(CutterShape::Flat, 3.0), 0.4, 1.5),
+            raster(cutter(CutterShape::Ball, 2.0), Stepover::Scallop(0.05), 0.0),
+        ]);
+        let target = relief(&job, 4.0, frame, &bumps);
+        let mut wood = Heightfield::flat(*target.grid(), 0.0);
+        for path in plan_quietly(&job, &target) {
+            prop_assert_eq!(path.check(&job), Ok(()));
+            assert_entries_are_ramped(&path, &job, &mut wood);
+        }
+    }
+
+    #[test]
+    fn a_fitted_path_lies_between_the_exact_one_and_the_tolerance(
+        bumps in bumps(SIZE, 3.0), y in 0.5f64..8.5, diameter in 1.0f64..3.5,
+    ) {
+        let job = job(SIZE.x, SIZE.y, 10.0, 0.25, Vec::new());
+        let target = relief(&job, 3.0, 0.0, &bumps);
+        let profile = Profile::Ball { radius_mm: 0.5 * diameter };
+        let dropper = Dropper::new(&target, profile);
+        let tracer = Tracer::new(|p: DVec2| dropper.drop(p), profile, 0.25, 0.004);
+        let (a, b) = (DVec2::new(0.0, y), DVec2::new(SIZE.x, y));
+        let path = tracer.trace(a, b);
+        let fitted = fit(&path, 0.004);
+        prop_assert!(fitted.len() <= path.len());
+        let exact: Vec<DVec2> = (0..=6000)
+            .map(|k| f64::from(k) * SIZE.x / 6000.0)
+            .map(|x| DVec2::new(x, dropper.drop(DVec2::new(x, y))))
+            .collect();
+        for k in (0..exact.len()).step_by(7) {
+            let (p, z) = (exact[k], height_on(&fitted, exact[k].x));
+            let near = exact[k.saturating_sub(300)..(k + 300).min(exact.len())]
+                .windows(2)
+                .map(|e| crate::geom::distance_to_segment(DVec2::new(p.x, z), e[0], e[1]))
+                .fold(f64::INFINITY, f64::min);
+            let tip = DVec3::new(p.x, y, z);
+            prop_assert!(!gouges(&target, &profile, tip, 0.0021), "too deep at {}", tip);
+            // The fit's 0.004 and what a small valley beside convex ground can still hide.
+            prop_assert!(z < p.y || near <= 0.015, "{near} above the exact path at {}", tip);
+        }
+    }
+}
+
+fn height_on(path: &[Sample], s: f64) -> f64 {
+    let k = path.partition_point(|p| p.s < s).clamp(1, path.len() - 1);
+    let (a, b) = (path[k - 1], path[k]);
+    a.z + (b.z - a.z) * ((s - a.s) / (b.s - a.s))
+}
+
+/// Rapids down and straight plunges end above the wood; the first sloping piece after them is no steeper than
+/// the ramp. (The whole descent is tested where it is made.)
+fn assert_entries_are_ramped(path: &Toolpath, job: &Job, wood: &mut Heightfield) {
+    let slope = libm::tan(job.ramp_rad);
+    let profile = Profile::of(&path.cutter);
+    let mut entering = false;
+    for m in &path.moves {
+        if m.is_rapid() {
+            entering = m.to.z < m.from.z;
+            assert!(!entering || !gouges(wood, &profile, m.to, 0.0), "rapid into wood at {}", m.to);
+        } else if m.from.truncate() == m.to.truncate() && m.to.z < m.from.z {
+            assert!(entering && !gouges(wood, &profile, m.to, 0.0), "straight down at {}", m.to);
+        } else if entering {
+            let down = m.from.z - m.to.z;
+            let run = m.to.truncate().distance(m.from.truncate());
+            assert!(down <= slope * run + 0.0011, "entry {down} down in {run}");
+            entering = false;
+        }
+        lower(wood, &profile, m);
+    }
+}
+
+/// Takes a move out of the wood by stamping.
+fn lower(wood: &mut Heightfield, profile: &Profile, m: &Move) {
+    let grid = *wood.grid();
+    let r = profile.radius_mm();
+    let (way, n) = (m.to - m.from, (m.length_mm() / 0.05).ceil().max(1.0));
+    for k in 0..=n as usize {
+        let tip = m.from + way * (k as f64 / n);
+        let low = grid.to_grid(tip.truncate() - DVec2::splat(r)).max(DVec2::ZERO);
+        let high = grid.to_grid(tip.truncate() + DVec2::splat(r)).max(DVec2::ZERO);
+        for j in low.y as usize..=(high.y as usize).min(grid.ny - 1) {
+            for i in low.x as usize..=(high.x as usize).min(grid.nx - 1) {
+                if let Some(h) = profile.height_at(grid.node(i, j).distance(tip.truncate())) {
+                    let z = &mut wood.z_mut()[j * grid.nx + i];
+                    *z = z.min((tip.z + h) as f32);
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn a_raster_leaves_no_more_than_the_scallop() {
+    for angle in [0.0, 30.0, 90.0] {
+        let op = raster(cutter(CutterShape::Ball, 2.0), Stepover::Scallop(0.05), angle);
+        let job = job(20.0, 14.0, 10.0, 0.2, vec![op]);
+        // One bump: a ball reaches all of it.
+        let bump = Bump { at: DVec2::new(6.0, 7.0), radius_mm: 4.0, height_mm: 1.5, wall: false };
+        let target = relief(&job, 2.0, 0.0, &[bump]);
+        let mut wood = Heightfield::flat(*target.grid(), 0.0);
+        let path = &plan_quietly(&job, &target)[0];
+        for m in &path.moves {
+            lower(&mut wood, &Profile::of(&path.cutter), m);
+        }
+        let most = wood.z().iter().zip(target.z()).map(|(w, t)| w - t).fold(f32::MIN, f32::max);
+        // Slopes reach 0.33 here: the cusp is up to 11 % higher there, and measured along z.
+        assert!(most < 0.05 * 1.17 + 0.008, "{most} left at {angle} degrees");
+        assert!(most > 0.03, "the passes lie closer than asked: {most}");
+    }
+}
+
+#[test]
+fn roughing_clears_a_level_ground_down_to_the_allowance() {
+    for shape in [CutterShape::Flat, CutterShape::Ball] {
+        let job = job(24.0, 15.0, 10.0, 0.25, vec![rough(cutter(shape, 6.0), 0.5, 1.5)]);
+        let target = relief(&job, 4.0, 0.0, &[]);
+        let path = &plan_quietly(&job, &target)[0];
+        let mut wood = Heightfield::flat(*target.grid(), 0.0);
+        for m in &path.moves {
+            lower(&mut wood, &Profile::of(&path.cutter), m);
+        }
+        let (low, high) = wood.range().unwrap();
+        let cusp = if shape == CutterShape::Ball { 0.26 } else { 0.0 };
+        assert!((low + 3.5).abs() < 0.0011, "{shape:?}: {low}");
+        assert!(f64::from(high) < -3.5 + cusp + 0.0011, "{shape:?}: {high}");
+        // Three levels of 1.17 mm, each one chain.
+        assert_eq!(
+            path.moves.windows(2).filter(|w| w[0].is_rapid() && !w[1].is_rapid()).count(),
+            3
+        );
+    }
+}
+
+#[test]
+fn the_same_bytes_with_one_and_two_threads() {
+    let job = job(
+        30.0,
+        20.0,
+        10.0,
+        0.25,
+        vec![
+            rough(cutter(CutterShape::Flat, 3.0), 0.4, 1.5),
+            raster(cutter(CutterShape::Ball, 2.0), Stepover::Scallop(0.02), 30.0),
+        ],
+    );
+    let wall = Bump { at: DVec2::new(9.0, 9.0), radius_mm: 4.0, height_mm: 2.5, wall: true };
+    let target = relief(&job, 4.0, 1.0, &[wall]);
+    let run = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| plan(&job, &target, &mut |_| ()).unwrap())
+    };
+    assert_eq!(run(1), run(2));
+}
+
+#[test]
+fn operations_with_one_cutter_share_a_program() {
+    let ball = cutter(CutterShape::Ball, 3.0);
+    let ops = vec![rough(ball.clone(), 0.3, 1.0), raster(ball, Stepover::Plan(0.8), 0.0)];
+    let job = job(12.0, 9.0, 10.0, 0.25, ops);
+    let target = relief(&job, 2.0, 0.0, &[]);
+    let paths = plan_quietly(&job, &target);
+    assert_eq!(paths.len(), 1);
+    assert_eq!(paths[0].name, "rough-finish-ball-3");
+    assert_eq!(paths[0].check(&job), Ok(()));
+}
+
+fn fails(job: &Job, target: &Heightfield) -> ToolpathError {
+    plan(job, target, &mut |_| ()).unwrap_err()
+}
+
+#[test]
+fn what_cannot_be_planned_is_refused() {
+    let ball = || cutter(CutterShape::Ball, 3.0);
+    let small = |op| job(12.0, 9.0, 10.0, 0.25, vec![op]);
+    let plain = small(raster(ball(), Stepover::Plan(0.8), 0.0));
+    let ground = relief(&plain, 2.0, 0.0, &[]);
+
+    let flat = small(raster(cutter(CutterShape::Flat, 3.0), Stepover::Scallop(0.01), 0.0));
+    assert!(matches!(
+        fails(&flat, &ground),
+        ToolpathError::ScallopWithoutBall { operation: 1, .. }
+    ));
+    let fine = small(raster(ball(), Stepover::Plan(1e-7), 0.0));
+    assert!(matches!(fails(&fine, &ground), ToolpathError::TooFine { .. }));
+    assert_eq!(fails(&plain, &relief(&plain, 0.0, 0.0, &[])), ToolpathError::NothingToCut);
+    let wide = job(13.0, 9.0, 10.0, 0.25, plain.operations.clone());
+    assert!(matches!(fails(&wide, &ground), ToolpathError::TargetTooSmall { .. }));
+    let deep = relief(&plain, 10.5, 0.0, &[]);
+    assert!(matches!(fails(&plain, &deep), ToolpathError::TargetOutsideStock { .. }));
+    let mut holes = ground.clone();
+    holes.z_mut()[7] = f32::NAN;
+    assert!(matches!(fails(&plain, &holes), ToolpathError::TargetOutsideStock { .. }));
+    let mut tiny = plain.clone();
+    tiny.machine.travel_mm.x = 8.0;
+    assert!(matches!(
+        fails(&tiny, &ground),
+        ToolpathError::Fault(PathFault::Travel { axis: 'X', .. })
+    ));
+}
+
+#[test]
+fn a_cutter_that_fits_nowhere_is_told() {
+    let ops = vec![
+        rough(cutter(CutterShape::Flat, 12.0), 0.5, 1.5),
+        raster(cutter(CutterShape::Ball, 1.0), Stepover::Plan(0.3), 0.0),
+    ];
+    let job = job(12.0, 9.0, 10.0, 0.25, ops);
+    // A pocket 6 x 3 mm: the roughing cutter is wider.
+    let target = relief(&job, 2.0, 3.0, &[]);
+    let mut notes = Vec::new();
+    let paths = plan(&job, &target, &mut |e| {
+        if let PlanEvent::Note(n) = e {
+            notes.push(n);
+        }
+    });
+    assert_eq!(paths.unwrap().len(), 1);
+    assert!(
+        notes.iter().any(|n| n.contains("rough, flat-12") && n.contains("fits nowhere")),
+        "{notes:?}"
+    );
+}
+
+#[test]
+fn broken_paths_are_found_out() {
+    let job = job(
+        12.0,
+        9.0,
+        10.0,
+        0.25,
+        vec![raster(cutter(CutterShape::Ball, 3.0), Stepover::Plan(0.8), 0.0)],
+    );
+    let good = plan_quietly(&job, &relief(&job, 2.0, 0.0, &[])).remove(0);
+    let broken = |change: &dyn Fn(&mut Vec<Move>)| {
+        let mut path = good.clone();
+        change(&mut path.moves);
+        path.check(&job).unwrap_err()
+    };
+    let feed = |speed| crate::geom::MoveKind::Feed { feed_mm_per_min: speed };
+    let down = good.moves.iter().position(|m| !m.is_rapid() && m.to.z < m.from.z).unwrap();
+    let across = good.moves.iter().position(|m| !m.is_rapid() && m.to.x != m.from.x).unwrap();
+    assert!(matches!(broken(&Vec::clear), PathFault::Empty { .. }));
+    assert!(matches!(broken(&|m| _ = m.remove(3)), PathFault::Gap { index: 3, .. }));
+    assert!(matches!(broken(&|m| _ = m.pop()), PathFault::EndsLow { .. }));
+    assert!(matches!(broken(&|m| m[down].kind = feed(5000.0)), PathFault::Plunge { .. }));
+    assert!(matches!(broken(&|m| m[down].kind = feed(0.0)), PathFault::BadFeed { .. }));
+    assert!(matches!(
+        broken(&|m| m[across].kind = crate::geom::MoveKind::Rapid),
+        PathFault::LowRapid { .. }
+    ));
+    assert!(matches!(broken(&|m| m[across].to.y = f64::NAN), PathFault::NotFinite { .. }));
+    assert!(matches!(
+        broken(&|m| {
+            m[across].to.x = 99.0;
+            m[across + 1].from.x = 99.0;
+        }),
+        PathFault::OutsideStock { .. }
+    ));
+}

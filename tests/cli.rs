@@ -1,0 +1,383 @@
+//! The built binary as a user meets it: what it writes, what it says, its exit codes.
+#![allow(clippy::unwrap_used, reason = "a test: what cannot be read or run should stop it")]
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::process::Output;
+
+/// A folder of its own for each test.
+struct Desk {
+    dir: tempfile::TempDir,
+}
+
+impl Desk {
+    fn new() -> Self {
+        Self { dir: tempfile::tempdir().unwrap() }
+    }
+
+    fn put(&self, name: &str, text: impl AsRef<[u8]>) -> PathBuf {
+        let path = self.dir.path().join(name);
+        std::fs::write(&path, text).unwrap();
+        path
+    }
+
+    fn run(&self, args: &[&str]) -> Output {
+        assert_cmd::Command::cargo_bin("relievo")
+            .unwrap()
+            .current_dir(self.dir.path())
+            .args(args)
+            .output()
+            .unwrap()
+    }
+
+    /// Every file below the folder with its bytes.
+    fn files(&self) -> BTreeMap<String, Vec<u8>> {
+        fn walk(root: &Path, dir: &Path, out: &mut BTreeMap<String, Vec<u8>>) {
+            for entry in std::fs::read_dir(dir).unwrap() {
+                let path = entry.unwrap().path();
+                if path.is_dir() {
+                    out.insert(path.strip_prefix(root).unwrap().display().to_string(), Vec::new());
+                    walk(root, &path, out);
+                } else {
+                    let name = path.strip_prefix(root).unwrap().display().to_string();
+                    out.insert(name, std::fs::read(&path).unwrap());
+                }
+            }
+        }
+        let mut out = BTreeMap::new();
+        walk(self.dir.path(), self.dir.path(), &mut out);
+        out
+    }
+}
+
+fn stderr(out: &Output) -> String {
+    String::from_utf8_lossy(&out.stderr).into_owned()
+}
+
+const LEAF: &str = r##"<svg xmlns="http://www.w3.org/2000/svg" width="30mm" height="20mm" viewBox="0 0 30 20">
+<ellipse cx="15" cy="10" rx="14" ry="9" fill="#2a7f3f"/>
+<path d="M3 10 Q15 4 27 10 Q15 16 3 10Z" fill="#8fd14f"/>
+</svg>"##;
+
+const LEAF_JOB: &str = r#"
+title = "Leaf"
+[artwork]
+file = "leaf.svg"
+[stock]
+width_mm = 40
+height_mm = 30
+thickness_mm = 10
+[relief]
+pitch_mm = 0.2
+depth_mm = 4
+[[layer]]
+name = "leaf"
+select = "fill:#2a7f3f"
+height_mm = 2
+[[layer]]
+name = "blade"
+select = "fill:#8fd14f"
+base_mm = 1
+height_mm = 3.5
+[[operation]]
+kind = "rough"
+cutter = "flat-6"
+[[operation]]
+kind = "raster"
+cutter = "ball-3"
+scallop_mm = 0.02
+"#;
+
+const OUTPUTS: [&str; 10] = [
+    "1-rough-flat-6.nc",
+    "2-finish-ball-3.nc",
+    "carved.png",
+    "depth.png",
+    "deviation.png",
+    "job.toml",
+    "paths.png",
+    "relief.png",
+    "relief.stl",
+    "report.html",
+];
+
+fn leaf_desk() -> Desk {
+    let desk = Desk::new();
+    desk.put("leaf.svg", LEAF);
+    desk.put("leaf.toml", LEAF_JOB);
+    desk
+}
+
+#[test]
+fn a_job_file_gives_all_outputs() {
+    let desk = leaf_desk();
+    let out = desk.run(&["carve", "leaf.toml"]);
+    assert_eq!(out.status.code(), Some(0), "{}", stderr(&out));
+    let files = desk.files();
+    for name in OUTPUTS {
+        let bytes = &files[&format!("leaf-carving/{name}")];
+        assert!(!bytes.is_empty(), "{name}");
+    }
+    let left: Vec<_> = files.keys().filter(|n| n.contains(".relievo")).collect();
+    assert!(left.is_empty(), "{left:?}");
+}
+
+#[test]
+fn programs_are_grbl_clean() {
+    let desk = leaf_desk();
+    assert_eq!(desk.run(&["carve", "leaf.toml"]).status.code(), Some(0));
+    for (name, bytes) in desk.files().iter().filter(|(n, _)| n.ends_with(".nc")) {
+        let text = std::str::from_utf8(bytes).unwrap();
+        assert!(text.is_ascii(), "{name}");
+        let code: Vec<&str> = text.lines().filter(|l| !l.starts_with('(')).collect();
+        assert!(text.lines().all(|l| l.len() <= 79), "{name}");
+        assert!(!code.iter().any(|l| l.to_ascii_lowercase().contains('e')), "{name}: exponent");
+        let preamble = code[..6].join(" ");
+        for word in ["G21", "G90", "G94", "G17", "G54"] {
+            assert!(preamble.contains(word), "{name}: {word} in {preamble}");
+        }
+        assert_eq!(code[code.len() - 2..], ["M5", "M30"], "{name}");
+        for word in ["stock", "zero", "cutter", "time", "proof"] {
+            let header: String = text.lines().take_while(|l| l.starts_with('(')).collect();
+            assert!(header.to_lowercase().contains(word), "{name}: {word} in {header}");
+        }
+    }
+}
+
+#[test]
+fn the_same_bytes_with_one_and_two_threads() {
+    let one = leaf_desk();
+    let two = leaf_desk();
+    assert_eq!(one.run(&["carve", "leaf.toml", "--threads", "1"]).status.code(), Some(0));
+    assert_eq!(two.run(&["carve", "leaf.toml", "--threads", "2"]).status.code(), Some(0));
+    let (one, two) = (one.files(), two.files());
+    assert!(one.keys().eq(two.keys()));
+    for (name, bytes) in &one {
+        assert!(bytes == &two[name], "{name} differs");
+    }
+}
+
+#[test]
+fn artwork_alone_is_carved_with_defaults() {
+    let desk = Desk::new();
+    let svg = LEAF.replace("30mm", "30").replace("20mm", "20");
+    desk.put("leaf.svg", svg);
+    desk.put("small.toml", ""); // an unrelated file beside it
+    let out = desk.run(&["carve", "leaf.svg", "--out", "made"]);
+    assert_eq!(out.status.code(), Some(0), "{}", stderr(&out));
+    let said = String::from_utf8_lossy(&out.stdout);
+    assert!(said.contains("150 mm"), "the default size is said aloud: {said}");
+    let files = desk.files();
+    assert!(files.contains_key("made/relief.png"));
+    assert!(!files.contains_key("leaf-carving"));
+}
+
+#[test]
+fn the_resolved_job_repeats_the_run() {
+    let desk = leaf_desk();
+    assert_eq!(desk.run(&["carve", "leaf.toml", "--out", "a/b"]).status.code(), Some(0));
+    let out = desk.run(&["carve", "a/b/job.toml", "--out", "again"]);
+    assert_eq!(out.status.code(), Some(0), "{}", stderr(&out));
+    let files = desk.files();
+    for name in ["1-rough-flat-6.nc", "2-finish-ball-3.nc", "relief.stl", "depth.png"] {
+        assert!(files[&format!("a/b/{name}")] == files[&format!("again/{name}")], "{name}");
+    }
+}
+
+#[test]
+fn new_writes_a_job_that_checks_and_never_overwrites() {
+    let desk = Desk::new();
+    desk.put("leaf.svg", LEAF);
+    let out = desk.run(&["new", "leaf.svg"]);
+    assert_eq!(out.status.code(), Some(0), "{}", stderr(&out));
+    let text = std::fs::read_to_string(desk.dir.path().join("leaf.toml")).unwrap();
+    assert!(text.contains("fill:#2a7f3f") && text.contains("fill:#8fd14f"), "{text}");
+    let check = desk.run(&["check", "leaf.toml"]);
+    assert_eq!(check.status.code(), Some(0), "{}", stderr(&check));
+    let again = desk.run(&["new", "leaf.svg"]);
+    assert_eq!(again.status.code(), Some(1));
+    assert!(stderr(&again).contains("leaf.toml"), "{}", stderr(&again));
+}
+
+#[test]
+fn lists_name_what_there_is() {
+    let desk = Desk::new();
+    for (command, word) in [
+        ("machines", "shapeoko3"),
+        ("cutters", "ball-3"),
+        ("woods", "beech"),
+        ("defaults", "pitch_mm"),
+    ] {
+        let out = desk.run(&[command]);
+        assert_eq!(out.status.code(), Some(0));
+        assert!(String::from_utf8_lossy(&out.stdout).contains(word), "{command}");
+    }
+    for command in ["machines", "cutters", "woods"] {
+        let out = desk.run(&[command, "--json"]);
+        let json: serde_json::Value = serde_json::from_slice(&out.stdout).unwrap();
+        assert!(json.as_array().unwrap().len() >= 3, "{command}");
+    }
+}
+
+/// Runs `args`, expects `code` and each of `words` in the message, and that nothing on the desk changed.
+#[track_caller]
+fn refused(desk: &Desk, args: &[&str], code: i32, words: &[&str]) {
+    let before = desk.files();
+    let out = desk.run(args);
+    let said = stderr(&out);
+    assert_eq!(out.status.code(), Some(code), "{said}");
+    for word in words {
+        assert!(said.contains(word), "'{word}' in:\n{said}");
+    }
+    assert!(!said.contains("panicked"), "{said}");
+    let errors = said.lines().filter(|l| l.starts_with("error")).count();
+    assert_eq!(errors, 1, "one error:\n{said}");
+    let after = desk.files();
+    let new: Vec<_> = after.keys().filter(|k| before.get(*k) != after.get(*k)).collect();
+    assert!(new.is_empty() && before.len() == after.len(), "left behind: {new:?}");
+}
+
+/// The leaf job with one line replaced.
+fn job_with(old: &str, new: &str) -> Desk {
+    let desk = leaf_desk();
+    assert!(LEAF_JOB.contains(old));
+    desk.put("leaf.toml", LEAF_JOB.replacen(old, new, 1));
+    desk
+}
+
+#[test]
+fn job_faults_point_at_line_and_column() {
+    let cases: [(&str, &str, &[&str]); 9] = [
+        ("depth_mm = 4", "dept_mm = 4", &["leaf.toml:11:1", "dept_mm", "depth_mm"]),
+        ("depth_mm = 4", "depth_mm = \"deep\"", &["leaf.toml:11:12"]),
+        ("depth_mm = 4", "depth_mm = -4", &["leaf.toml:11:12", "depth_mm"]),
+        ("depth_mm = 4", "depth_mm = nan", &["leaf.toml:11:12"]),
+        ("depth_mm = 4", "depth_in = 0.2", &["leaf.toml:11:1", "depth_mm"]),
+        ("depth_mm = 4", "depth_mm = 1e300", &["leaf.toml:11:12"]),
+        ("depth_mm = 4", "depth_mm = = 4", &["leaf.toml:11"]),
+        ("cutter = \"flat-6\"", "cutter = \"flat-7\"", &["flat-7", "flat-6"]),
+        ("title = \"Leaf\"", "machine = \"shapeoko\"", &["leaf.toml:2:11", "shapeoko3"]),
+    ];
+    for (old, new, words) in cases {
+        refused(&job_with(old, new), &["carve", "leaf.toml"], 1, words);
+        refused(&job_with(old, new), &["check", "leaf.toml"], 1, words);
+    }
+}
+
+#[test]
+fn files_that_are_not_there_are_named() {
+    let desk = leaf_desk();
+    refused(&desk, &["carve", "nothing.toml"], 1, &["nothing.toml"]);
+    refused(&desk, &["carve", "nothing.svg"], 1, &["nothing.svg"]);
+    let job = job_with("leaf.svg", "lost.svg");
+    refused(&job, &["carve", "leaf.toml"], 1, &["lost.svg"]);
+    let machine = job_with("title = \"Leaf\"", "machine = \"my/router.toml\"");
+    refused(&machine, &["carve", "leaf.toml"], 1, &["my/router.toml"]);
+}
+
+#[test]
+fn broken_artwork_is_refused() {
+    let svg = |body: &str| {
+        format!(
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"30mm\" height=\"20mm\" viewBox=\"0 0 30 20\">{body}</svg>"
+        )
+    };
+    let cases: Vec<(&str, String, Vec<&str>)> = vec![
+        ("truncated", LEAF[..LEAF.len() - 40].to_string(), vec!["art.svg"]),
+        ("not svg", "hello".into(), vec!["art.svg"]),
+        ("empty file", String::new(), vec!["art.svg"]),
+        ("no shapes", svg(""), vec!["art.svg"]),
+        ("a point", svg("<path d=\"M1 1 L1 1 Z\" fill=\"red\"/>"), vec!["art.svg"]),
+        ("huge", svg("<path d=\"M0 0 L1e30 0 L1e30 1e30 Z\" fill=\"red\"/>"), vec!["art.svg"]),
+        (
+            "no size",
+            LEAF.replace("viewBox=\"0 0 30 20\"", "viewBox=\"0 0 0 0\"").replace("30mm", "0"),
+            vec!["art.svg"],
+        ),
+        (
+            "outside reference",
+            svg("<image href=\"photo.png\" width=\"9\" height=\"9\"/>"),
+            vec!["photo.png"],
+        ),
+    ];
+    for (what, text, words) in cases {
+        let desk = Desk::new();
+        desk.put("art.svg", &text);
+        println!("{what}");
+        refused(&desk, &["carve", "art.svg"], 1, &words);
+    }
+    let desk = Desk::new();
+    desk.put("art.svg", [0xff_u8, 0xfe, 0x00, 0x41]);
+    refused(&desk, &["carve", "art.svg"], 1, &["art.svg"]);
+}
+
+#[test]
+fn nan_in_artwork_never_reaches_the_relief() {
+    let desk = Desk::new();
+    desk.put("art.svg", "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"30mm\" height=\"20mm\" viewBox=\"0 0 30 20\"><path d=\"M0 0 LNaN 3 L9 9 Z\" fill=\"red\"/></svg>");
+    refused(&desk, &["carve", "art.svg"], 1, &["art.svg"]);
+}
+
+#[test]
+fn jobs_that_cannot_be_carved_are_refused() {
+    refused(
+        &job_with("width_mm = 40", "width_mm = 0"),
+        &["carve", "leaf.toml"],
+        1,
+        &["leaf.toml:6:12"],
+    );
+    refused(
+        &job_with("thickness_mm = 10", "thickness_mm = 3"),
+        &["carve", "leaf.toml"],
+        1,
+        &["mm"],
+    );
+    refused(
+        &job_with("height_mm = 3.5", "height_mm = 4.75"),
+        &["carve", "leaf.toml"],
+        1,
+        &["0.75"],
+    );
+    refused(&job_with("width_mm = 40", "width_mm = 4000"), &["carve", "leaf.toml"], 1, &["4000"]);
+    refused(
+        &job_with("cutter = \"ball-3\"", "cutter = { shape = \"ball\", diameter_mm = 90 }"),
+        &["carve", "leaf.toml"],
+        1,
+        &["90"],
+    );
+    refused(
+        &job_with("pitch_mm = 0.2", "pitch_mm = 0.0011"),
+        &["carve", "leaf.toml"],
+        1,
+        &["pitch_mm"],
+    );
+}
+
+#[cfg(unix)]
+#[test]
+fn a_folder_that_cannot_be_written_is_named() {
+    let desk = leaf_desk();
+    desk.put("in-the-way", "a file");
+    refused(&desk, &["carve", "leaf.toml", "--out", "in-the-way/out"], 1, &["in-the-way"]);
+    refused(&desk, &["carve", "leaf.toml", "--out", "in-the-way"], 1, &["in-the-way"]);
+    refused(&desk, &["carve", "leaf.toml", "--out", "/proc/relievo"], 1, &["/proc/relievo"]);
+}
+
+#[test]
+fn wrong_usage_exits_with_two() {
+    let desk = leaf_desk();
+    for args in [&["carve"][..], &["carve", "leaf.toml", "--colour"], &["crave", "leaf.toml"]] {
+        assert_eq!(desk.run(args).status.code(), Some(2), "{args:?}");
+    }
+}
+
+#[test]
+fn a_failed_check_writes_nothing_and_exits_with_four() {
+    // Strict, with passes far too wide for the cusp that is asked for.
+    let text = LEAF_JOB
+        .replace("scallop_mm = 0.02", "stepover_mm = 2.5")
+        .replace("title = \"Leaf\"", "strict = true");
+    let desk = leaf_desk();
+    desk.put("leaf.toml", text);
+    refused(&desk, &["carve", "leaf.toml"], 4, &["are left above"]);
+}

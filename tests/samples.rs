@@ -1,0 +1,77 @@
+//! Every sample is complete and carves. With `RELIEVO_SAMPLES=full` at its own pitch, otherwise at a coarse one.
+#![allow(clippy::unwrap_used, reason = "a test: what cannot be read should stop it")]
+
+use std::path::{Path, PathBuf};
+
+fn samples() -> Vec<PathBuf> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("samples");
+    let mut all: Vec<_> = std::fs::read_dir(root)
+        .unwrap()
+        .map(|e| e.unwrap().path())
+        .filter(|p| p.is_dir())
+        .collect();
+    all.sort();
+    all
+}
+
+fn name(sample: &Path) -> &str {
+    sample.file_name().unwrap().to_str().unwrap()
+}
+
+fn carve(sample: &Path) {
+    let name = name(sample);
+    let desk = tempfile::tempdir().unwrap();
+    let mut job = std::fs::read_to_string(sample.join(format!("{name}.toml"))).unwrap();
+    if std::env::var_os("RELIEVO_SAMPLES").is_none_or(|v| v != "full") {
+        let at = job.find("pitch_mm = ").expect("a sample says its pitch");
+        let end = at + job[at..].find('\n').unwrap();
+        job.replace_range(at..end, "pitch_mm = 0.4");
+    }
+    std::fs::write(desk.path().join("job.toml"), job).unwrap();
+    std::fs::copy(sample.join(format!("{name}.svg")), desk.path().join(format!("{name}.svg")))
+        .unwrap();
+    let out = assert_cmd::Command::cargo_bin("relievo")
+        .unwrap()
+        .current_dir(desk.path())
+        .args(["carve", "job.toml"])
+        .output()
+        .unwrap();
+    let said = String::from_utf8_lossy(&out.stderr);
+    assert_eq!(out.status.code(), Some(0), "{name}: {said}");
+    assert!(desk.path().join("job-carving/relief.png").is_file());
+}
+
+#[test]
+fn every_sample_has_artwork_licence_and_job() {
+    let all = samples();
+    assert!(all.len() >= 4);
+    for sample in all {
+        for file in [
+            format!("{}.svg", name(&sample)),
+            format!("{}.toml", name(&sample)),
+            "LICENCE.txt".into(),
+        ] {
+            assert!(sample.join(&file).is_file(), "{}: {file}", sample.display());
+        }
+    }
+}
+
+#[test]
+fn lotus_carves() {
+    carve(&samples().into_iter().find(|s| name(s) == "lotus").unwrap());
+}
+
+#[test]
+fn celtic_square_carves() {
+    carve(&samples().into_iter().find(|s| name(s) == "celtic-square").unwrap());
+}
+
+#[test]
+fn cloud_carves() {
+    carve(&samples().into_iter().find(|s| name(s) == "cloud").unwrap());
+}
+
+#[test]
+fn tiger_carves() {
+    carve(&samples().into_iter().find(|s| name(s) == "tiger").unwrap());
+}
