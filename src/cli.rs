@@ -5,6 +5,7 @@ mod check;
 mod files;
 mod inputs;
 mod lists;
+mod memory;
 mod new;
 mod observe;
 mod outcome;

@@ -157,9 +157,9 @@ fn uses_in(module: &[String], source: &str) -> Vec<Use> {
 
 /// The sentence that is wrong with a use, if any.
 fn fault(table: &Table, u: &Use) -> Option<String> {
-    let Some(module) = u.from.first() else { return None }; // lib.rs itself holds the house together
+    let module = u.from.first()?; // lib.rs itself holds the house together
     let row = table.rows.get(module).cloned().unwrap_or_default();
-    let Some(target) = u.to.first() else { return None };
+    let target = u.to.first()?;
     let reaches = |path: &str| {
         let want: Vec<&str> = path.split("::").collect();
         u.to.len() >= want.len() && u.to.iter().zip(&want).all(|(a, b)| a == b)

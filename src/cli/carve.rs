@@ -2,7 +2,7 @@
 
 use super::files::{self, Outputs};
 use super::observe::{self, Stages};
-use super::{Stop, inputs, outcome};
+use super::{Stop, inputs, memory, outcome};
 use crate::carve;
 use std::path::{Path, PathBuf};
 
@@ -37,6 +37,7 @@ pub(super) fn run(args: &Args) -> Result<(), Stop> {
     stages.enter("read");
     let input = inputs::load(&args.input)?;
     let folder = args.out.clone().unwrap_or_else(|| default_folder(&args.input));
+    memory::check(&input)?;
     let mut outputs = Outputs::prepare(&folder)?;
     let carving = carve(input.draft, &input.artwork, &mut |stage| stages.enter(stage))
         .map_err(|e| outcome::with_file(e, &input.artwork_file))?;

@@ -33,7 +33,7 @@ pub(super) fn read_text(path: &Path) -> Result<String> {
         Ok(text) => Ok(text),
         Err(e) => {
             let upto = e.utf8_error().valid_up_to();
-            let line = e.as_bytes()[..upto].iter().filter(|b| **b == b'\n').count() + 1;
+            let line = e.as_bytes()[..upto].split(|b| *b == b'\n').count();
             bail!("{}:{line}: not UTF-8 text; save the file as UTF-8", path.display())
         }
     }

@@ -15,6 +15,9 @@ use std::path::Path;
 /// A file of the run: name and bytes.
 pub(super) type Made = (String, Vec<u8>);
 
+/// Makes the bytes of one file.
+type Make<'a> = dyn Fn() -> Result<Vec<u8>, ReportError> + Sync + 'a;
+
 /// An error of the artwork or its outlines names the file; all others name their place themselves.
 pub(super) fn with_file(error: CarveError, artwork: &Path) -> Stop {
     let of_artwork = matches!(error, CarveError::Artwork(_) | CarveError::Outline(_));
@@ -49,7 +52,7 @@ pub(super) fn outputs(
     let limits =
         DeviationScale { gouge_mm: job.tolerance.gouge_mm, scallop_mm: job.tolerance.scallop_mm };
     let title = |what: &str| format!("{} - {what}", job.title);
-    let jobs: [(&str, &(dyn Fn() -> Result<Vec<u8>, ReportError> + Sync)); 6] = [
+    let jobs: [(&str, &Make); 6] = [
         ("relief.png", &|| report::shaded_png(target, Look::Plaster, Some(&title("relief")))),
         ("carved.png", &|| report::shaded_png(&verdict.carved, wood, Some(&title("as carved")))),
         ("deviation.png", &|| {

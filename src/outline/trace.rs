@@ -14,6 +14,10 @@ use crate::job::LayerSpec;
 /// Most chords that one shape is flattened into.
 const MAX_CHORDS: usize = 4_000_000;
 
+/// Curves are flattened this much finer than `chord_mm` asks. A surface that rises with the distance to the outline
+/// shows each chord as a facet, and the angle between facets falls only with the square root of the tolerance.
+const FLATTEN_PER_CHORD: f64 = 0.1;
+
 /// Most crossings that are resolved in one shape.
 const MAX_CROSSINGS: usize = 200_000;
 
@@ -193,7 +197,7 @@ fn resolve(shape: &Shape, grid: &FixedGrid, chord_mm: f64) -> Result<Resolved, O
     if !all_finite {
         return Err(OutlineError::NotFinite { shape: name(shape) });
     }
-    let rings = curve::flatten(&shape.curve, chord_mm);
+    let rings = curve::flatten(&shape.curve, chord_mm * FLATTEN_PER_CHORD);
     if rings.iter().map(Vec::len).sum::<usize>() > MAX_CHORDS {
         let (shape, limit) = (name(shape), MAX_CHORDS);
         return Err(OutlineError::TooFine { shape, chord_mm, limit });

@@ -275,14 +275,14 @@ fn legend(
     );
     let allowed = limits.scallop_mm + limits.gouge_mm;
     let marks = [
-        (-limits.gouge_mm, format!("gouge limit {}", short(-limits.gouge_mm)), Align::Right),
-        (allowed, format!("scallop + gouge {}", short(allowed)), Align::Left),
+        // The gouge limit stands so near the left end that its label begins there.
+        (-limits.gouge_mm, format!("gouge limit {}", short(-limits.gouge_mm)), left),
+        (allowed, format!("scallop + gouge {}", short(allowed)), x_of(allowed) - px(8.0)),
     ];
-    for (d, label, align) in marks {
+    for (d, label, from) in marks {
         let x = x_of(d);
         canvas.line(&[(x, top - px(14.0)), (x, top + height)], px(3.0).max(1.0), INK, None);
-        let aside = if align == Align::Right { px(8.0) } else { -px(8.0) };
-        canvas.text(&label, (x + aside, top - px(24.0)), small.colored(INK).aligned(align));
+        canvas.text(&label, (from, top - px(24.0)), small.colored(INK));
     }
 }
 
