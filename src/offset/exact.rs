@@ -17,11 +17,6 @@
 //! themselves. On lines on which two neighbours meet, both give the same height, so that no tolerance
 //! is needed: the highest contact wins.
 
-#![allow(
-    clippy::inline_always,
-    reason = "vector instructions reach only what is inlined into the functions of `simd`"
-)]
-
 use rayon::prelude::*;
 
 use super::contact::TOUCH_MM;

@@ -5,11 +5,6 @@
 //! is summed for the whole of it. Bands of rows are independent; inside a band the columns are packed
 //! in tiles, so that the rows of a tile lie side by side in the cache.
 
-#![allow(
-    clippy::inline_always,
-    reason = "vector instructions reach only what is inlined into the functions of `simd`"
-)]
-
 use rayon::prelude::*;
 
 use super::simd::{self, Path};
