@@ -126,7 +126,9 @@ fn a_job_file_gives_all_outputs() {
 fn programs_are_grbl_clean() {
     let desk = leaf_desk();
     assert_eq!(desk.run(&["carve", "leaf.toml"]).status.code(), Some(0));
-    for (name, bytes) in desk.files().iter().filter(|(n, _)| n.ends_with(".nc")) {
+    for (name, bytes) in
+        desk.files().iter().filter(|(n, _)| Path::new(n).extension().is_some_and(|e| e == "nc"))
+    {
         let text = std::str::from_utf8(bytes).unwrap();
         assert!(text.is_ascii(), "{name}");
         let code: Vec<&str> = text.lines().filter(|l| !l.starts_with('(')).collect();

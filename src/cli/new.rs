@@ -1,9 +1,9 @@
 //! `relievo new ART.svg`: a commented job file, one layer for each colour found, ready to edit.
 
-use super::{Stop, inputs, observe};
+use super::{Stop, files, inputs, observe};
 use crate::job;
 use anyhow::{Context, anyhow};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  relievo new rose.svg        writes rose.toml")]
@@ -30,7 +30,8 @@ pub(super) fn run(args: &Args) -> Result<(), Stop> {
     }
     let out = args.out.clone().unwrap_or_else(|| args.artwork.with_extension("toml"));
     let input = inputs::load(&args.artwork)?;
-    let name = args.artwork.file_name().unwrap_or_default().to_string_lossy();
+    let folder = out.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let name = files::name_from(folder, &args.artwork)?;
     let text = job::template(&name, &input.artwork.found(), &input.library)?;
     write_new(&out, &text)?;
     if !args.quiet {
@@ -44,7 +45,7 @@ pub(super) fn run(args: &Args) -> Result<(), Stop> {
 }
 
 /// Writes a file that must not be there yet.
-fn write_new(path: &std::path::Path, text: &str) -> anyhow::Result<()> {
+fn write_new(path: &Path, text: &str) -> anyhow::Result<()> {
     use std::io::Write;
     let mut file = match std::fs::File::create_new(path) {
         Err(e) if e.kind() == std::io::ErrorKind::AlreadyExists => {
