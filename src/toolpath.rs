@@ -194,7 +194,13 @@ pub fn plan(
         let mut out = Emitter::new(job, operation);
         match operation.kind {
             OperationKind::Rough { leave_mm, stepdown_mm, stepover_mm, angle_rad } => {
-                let cut = Rough { leave_mm, stepdown_mm, stepover_mm, angle_rad };
+                let cut = Rough {
+                    leave_mm,
+                    stepdown_mm,
+                    stepover_mm,
+                    angle_rad,
+                    only_deeper_than_mm: 0.0,
+                };
                 rough::rough(&site, &cut, &mut block, &mut out)?;
             }
             OperationKind::Raster { stepover, angle_rad } => {

@@ -342,17 +342,36 @@ fn jobs_that_cannot_be_carved_are_refused() {
     );
     refused(&job_with("width_mm = 40", "width_mm = 4000"), &["carve", "leaf.toml"], 1, &["4000"]);
     refused(
-        &job_with("cutter = \"ball-3\"", "cutter = { shape = \"ball\", diameter_mm = 90 }"),
-        &["carve", "leaf.toml"],
-        1,
-        &["90"],
-    );
-    refused(
         &job_with("pitch_mm = 0.2", "pitch_mm = 0.0011"),
         &["carve", "leaf.toml"],
         1,
         &["pitch_mm"],
     );
+}
+
+#[test]
+fn a_cutter_wider_than_anything_is_refused() {
+    let wider = "cutter = { shape = \"flat\", diameter_mm = 390, flute_mm = 30, stickout_mm = 40 }";
+    refused(&job_with("cutter = \"flat-6\"", wider), &["carve", "leaf.toml"], 1, &["390"]);
+}
+
+#[test]
+fn a_job_bigger_than_memory_is_refused_at_once() {
+    let text = LEAF_JOB
+        .replace("width_mm = 40", "width_mm = 420")
+        .replace("height_mm = 30", "height_mm = 420")
+        .replace("pitch_mm = 0.2", "pitch_mm = 0.005");
+    let desk = leaf_desk();
+    desk.put("leaf.toml", text);
+    refused(&desk, &["carve", "leaf.toml"], 1, &["pitch_mm", "MiB"]);
+    refused(&desk, &["check", "leaf.toml"], 1, &["pitch_mm", "MiB"]);
+}
+
+#[test]
+fn the_job_file_is_never_overwritten() {
+    let desk = leaf_desk();
+    desk.put("job.toml", LEAF_JOB);
+    refused(&desk, &["carve", "job.toml", "--out", "."], 1, &["job.toml", "--out"]);
 }
 
 #[cfg(unix)]

@@ -37,12 +37,13 @@ pub(super) fn run(args: &Args) -> Result<(), Stop> {
     stages.enter("read");
     let input = inputs::load(&args.input)?;
     let folder = args.out.clone().unwrap_or_else(|| default_folder(&args.input));
+    spare_the_input(&args.input, &folder)?;
     memory::check(&input)?;
     let mut outputs = Outputs::prepare(&folder)?;
     let carving = carve(input.draft, &input.artwork, &mut |stage| stages.enter(stage))
         .map_err(|e| outcome::with_file(e, &input.artwork_file))?;
     if !carving.verdict.passed() {
-        return Err(Stop::CheckFailed(outcome::failure(&carving)));
+        return Err(Stop::CheckFailed(outcome::failure(&carving, &outputs.earlier_programs()?)));
     }
     stages.enter("pictures");
     let again = files::name_from(&folder, &input.artwork_file)?;
@@ -61,6 +62,18 @@ pub(super) fn run(args: &Args) -> Result<(), Stop> {
     }
     if args.timings {
         observe::complain(&timings);
+    }
+    Ok(())
+}
+
+/// The resolved job must not take the place of the job that it came from.
+fn spare_the_input(input: &Path, folder: &Path) -> anyhow::Result<()> {
+    let same = |a: &Path, b: &Path| matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b);
+    if same(&folder.join("job.toml"), input) {
+        anyhow::bail!(
+            "the outputs would overwrite {}; choose another folder with --out",
+            input.display()
+        );
     }
     Ok(())
 }

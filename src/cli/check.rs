@@ -1,6 +1,6 @@
 //! `relievo check JOB.toml`: reads and checks everything up to the relief, writes nothing.
 
-use super::{Stop, inputs, observe, outcome};
+use super::{Stop, inputs, memory, observe, outcome};
 use crate::design;
 use std::path::PathBuf;
 
@@ -17,6 +17,7 @@ pub(super) struct Args {
 
 pub(super) fn run(args: &Args) -> Result<(), Stop> {
     let input = inputs::load(&args.input)?;
+    memory::check(&input)?;
     let design = design(input.draft, &input.artwork, &mut |_| {})
         .map_err(|e| outcome::with_file(e, &input.artwork_file))?;
     if args.quiet {

@@ -134,23 +134,44 @@ impl Outputs {
                 bail!("{} is a folder; move it away", to.display());
             }
         }
-        for stale in self.programs_of_earlier_runs()? {
-            fs::remove_file(&stale)
-                .with_context(|| format!("cannot remove the old program {}", stale.display()))?;
+        let stale = self.earlier_programs()?;
+        let replaced = self.names.iter().map(|n| self.folder.join(n)).filter(|p| p.exists());
+        let mut aside: Vec<(PathBuf, PathBuf)> = Vec::new();
+        let mut moved: Vec<PathBuf> = Vec::new();
+        let exchange = || -> Result<()> {
+            for old in stale.into_iter().chain(replaced) {
+                let keep = staged.join(format!("old-{}", aside.len()));
+                fs::rename(&old, &keep)
+                    .with_context(|| format!("cannot replace {}", old.display()))?;
+                aside.push((old, keep));
+            }
+            for name in &self.names {
+                let to = self.folder.join(name);
+                fs::rename(staged.join(name), &to)
+                    .with_context(|| format!("cannot write {}", to.display()))?;
+                moved.push(to);
+            }
+            Ok(())
+        };
+        let done = exchange();
+        if done.is_err() {
+            // All or nothing: what was moved in goes, what was there comes back.
+            for new in moved {
+                fs::remove_file(new).ok();
+            }
+            for (old, keep) in aside {
+                fs::rename(keep, old).ok();
+            }
         }
-        for name in &self.names {
-            let to = self.folder.join(name);
-            fs::rename(staged.join(name), &to)
-                .with_context(|| format!("cannot write {}", to.display()))?;
-        }
-        Ok(())
+        done
     }
 
     fn staged(&self, name: &str) -> PathBuf {
         self.staging.lock().unwrap_or_else(PoisonError::into_inner).path.join(name)
     }
 
-    fn programs_of_earlier_runs(&self) -> Result<Vec<PathBuf>> {
+    /// Programs in the destination that an earlier run wrote and this one does not replace.
+    pub(super) fn earlier_programs(&self) -> Result<Vec<PathBuf>> {
         let mut stale = Vec::new();
         for entry in fs::read_dir(&self.folder)
             .with_context(|| format!("cannot list {}", self.folder.display()))?

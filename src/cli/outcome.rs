@@ -4,13 +4,14 @@ use super::Stop;
 use crate::CarveError;
 use crate::Carving;
 use crate::job::{CutterShape, Job, SurfaceSpec};
-use crate::proof::{FailureKind, Quantiles};
+use crate::proof::{FailureKind, ProofError, Quantiles};
 use crate::report::{
     self, Check, CutterRow, DeviationScale, LayerRow, LeftoverRow, Look, Picture, ProgramRow,
     ReportData, ReportError, StockFacts,
 };
+use crate::toolpath::ToolpathError;
 use rayon::prelude::*;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// A file of the run: name and bytes.
 pub(super) type Made = (String, Vec<u8>);
@@ -20,16 +21,27 @@ type Make<'a> = dyn Fn() -> Result<Vec<u8>, ReportError> + Sync + 'a;
 
 /// An error of the artwork or its outlines names the file; all others name their place themselves.
 pub(super) fn with_file(error: CarveError, artwork: &Path) -> Stop {
+    // An unreadable program or a path beyond the machine is a failed check of ours, not bad input.
+    if matches!(
+        error,
+        CarveError::Proof(ProofError::Read { .. }) | CarveError::Toolpath(ToolpathError::Fault(_))
+    ) {
+        return Stop::CheckFailed(format!("error: a check failed; no file was written\n  {error}"));
+    }
     let of_artwork = matches!(error, CarveError::Artwork(_) | CarveError::Outline(_));
     let error = anyhow::Error::from(error);
     if of_artwork { error.context(artwork.display().to_string()).into() } else { error.into() }
 }
 
-/// What a failed proof says.
-pub(super) fn failure(carving: &Carving) -> String {
+/// What a failed proof says; `earlier` are programs that the folder holds from another run.
+pub(super) fn failure(carving: &Carving, earlier: &[PathBuf]) -> String {
     let mut text = String::from("error: the proof failed; no file was written");
     for f in &carving.verdict.failures {
         text += &format!("\n  {f}");
+    }
+    if !earlier.is_empty() {
+        let names: Vec<_> = earlier.iter().map(|p| p.display().to_string()).collect();
+        text += &format!("\n  programs of an EARLIER run are still there: {}", names.join(", "));
     }
     text
 }

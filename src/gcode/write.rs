@@ -2,7 +2,7 @@
 //!
 //! Few and short lines: the wire and the controller's parser set the pace of a relief. A word is written only
 //! when it changes what the controller already knows; numbers have at most three decimals and no trailing zeros.
-//! A program leans on nothing but its own first lines: it sets every mode it uses.
+//! A program sets every mode it uses in its first lines; offsets of G92 and G43.1 must be clear, as after a reset.
 
 use crate::geom::{DVec3, MoveKind};
 use crate::job::Job;
@@ -21,7 +21,9 @@ pub fn file_stem(number: usize, path: &Toolpath) -> String {
 pub fn header(job: &Job, number: usize, path: &Toolpath, seconds: f64) -> Vec<String> {
     let lowest = path.moves.iter().map(|m| m.to.z).fold(0.0, f64::min);
     let cutter = &path.cutter;
-    let minutes = (seconds / 60.0).floor();
+    let seconds = seconds.round() as u64;
+    // After the first program the top may be gone where the cutter is to be zeroed.
+    let z_zero = if number == 1 { "its top" } else { "its UNCUT top, as in program 1" };
     vec![
         format!("relievo {} - {} - program {number}", env!("CARGO_PKG_VERSION"), job.title),
         format!(
@@ -32,13 +34,13 @@ pub fn header(job: &Job, number: usize, path: &Toolpath, seconds: f64) -> Vec<St
             job.stock.thickness_mm,
             job.stock.wood.name
         ),
-        format!("zero X Y: {} of the stock; zero Z: its top", job.stock.origin.words()),
+        format!("zero X Y: {} of the stock; zero Z: {z_zero}", job.stock.origin.words()),
         format!(
             "cutter {}, diameter {} mm, at least {} mm out of the collet; S{}",
             cutter.name, cutter.diameter_mm, cutter.stickout_mm, path.spindle_rpm
         ),
         format!("lowest Z {lowest:.3} mm, safe Z {} mm", job.safe_z_mm),
-        format!("time {minutes:.0} min {:02.0} s by the planner model", seconds - minutes * 60.0),
+        format!("time {} min {:02} s by the planner model", seconds / 60, seconds % 60),
         format!(
             "proof: dry run of these bytes, no gouge over {} mm, no rapid in wood",
             job.tolerance.gouge_mm

@@ -139,7 +139,7 @@ impl Draft {
     ) -> Result<Vec<Operation>, JobError> {
         if self.operations.first().is_some_and(|op| op.kind == KindDraft::Raster) {
             notes.push(
-                "no roughing comes before the finishing passes: they cut the full depth at once"
+                "no roughing comes before the finishing passes: their cutter clears the wood in levels first, which takes long"
                     .to_owned(),
             );
         }

@@ -2,10 +2,14 @@
 //!
 //! The distance of the passes is the same in plan everywhere: the scallop asked for holds on level
 //! ground and along slopes; on a slope across the passes it grows by 1/cos^2 of the slope.
+//!
+//! Where the wood still stands more than a cutter's diameter above the target (pockets that the roughing cutter did
+//! not fit into, or no roughing at all), the finishing cutter first takes it down in ramped levels of its own.
 
 use super::chain::{Span, chains};
 use super::emit::{Emitter, feed_seconds, lift_seconds};
 use super::fit::fit;
+use super::rough::{Rough, rough};
 use super::rows::{Row, rows, slanted_rim};
 use super::trace::{Sample, Tracer};
 use super::{Site, ToolpathError};
@@ -20,6 +24,13 @@ use rayon::prelude::*;
 const TOP_MM: f64 = -1e-3;
 /// Gap at which the tip passes over the untouched top of the stock, mm.
 const TOP_GAP_MM: f64 = 0.1;
+/// Deepest cut of a finishing pass, in diameters; deeper wood is taken down in levels first.
+const DEEPEST_PASS_PER_DIAMETER: f64 = 1.0;
+/// Wood that those levels leave on the target, in diameters.
+const LEVELS_LEAVE_PER_DIAMETER: f64 = 0.1;
+/// Distance of the passes of those levels, in diameters.
+const LEVELS_STEPOVER_PER_DIAMETER: f64 = 0.4;
+
 /// How far beyond its work a pass begins and ends when the row has room: space to ramp, mm.
 const ENTRY_ROOM_MM: f64 = 2.0;
 
@@ -53,6 +64,7 @@ pub(super) fn raster(
             })?
         }
     };
+    clear_deep_wood(site, angle_rad, block, out)?;
     let dropper = Dropper::new(site.target, profile);
     let fit_mm = site.job.tolerance.fit_mm;
     let pitch = site.target.grid().pitch_mm;
@@ -78,14 +90,33 @@ pub(super) fn raster(
         (feed_seconds(site.operation, &points) <= lift)
             .then(|| points[1..points.len() - 1].to_vec())
     };
+    let before = out.moves().len();
     for chain in chains(spans, link) {
         let wood = block.highest_under(profile.radius_mm(), chain[0].truncate());
         out.chain(&chain, wood);
     }
     if site.later {
-        block.cut(&profile, out.moves());
+        block.cut(&profile, &out.moves()[before..]);
     }
     Ok(())
+}
+
+/// Takes wood that is too deep for one pass down in levels.
+fn clear_deep_wood(
+    site: &Site,
+    angle_rad: f64,
+    block: &mut Block,
+    out: &mut Emitter,
+) -> Result<(), ToolpathError> {
+    let diameter = site.operation.cutter.diameter_mm;
+    let levels = Rough {
+        leave_mm: LEVELS_LEAVE_PER_DIAMETER * diameter,
+        stepdown_mm: site.job.stock.wood.stepdown_per_diameter * diameter,
+        stepover_mm: LEVELS_STEPOVER_PER_DIAMETER * diameter,
+        angle_rad,
+        only_deeper_than_mm: DEEPEST_PASS_PER_DIAMETER * diameter,
+    };
+    rough(site, &levels, block, out)
 }
 
 /// Lifts the path off the stock's top where it does not go below it.

@@ -23,6 +23,8 @@ pub(super) struct Rough {
     pub(super) stepdown_mm: f64,
     pub(super) stepover_mm: f64,
     pub(super) angle_rad: f64,
+    /// Only places with more wood than this above the lowest allowed height are worked on, mm; 0 = all.
+    pub(super) only_deeper_than_mm: f64,
 }
 
 /// A row with what is known along it, at the same places.
@@ -75,7 +77,7 @@ pub(super) fn rough(
     for k in 1..=levels {
         let z = lowest * (k as f64 / levels as f64);
         let spans =
-            surveys.iter().map(|s| spans(s, z, site.operation.cutter.diameter_mm)).collect();
+            surveys.iter().map(|s| spans(s, z, cut, site.operation.cutter.diameter_mm)).collect();
         let link = |a: DVec3, b: DVec3| {
             let direct = [a, b];
             if feed_seconds(site.operation, &direct) > lift_seconds(site.job, site.operation, a, b)
@@ -90,7 +92,7 @@ pub(super) fn rough(
             let wood = block.highest_under(profile.radius_mm(), chain[0].truncate());
             out.chain(&chain, wood);
         }
-        if k < levels || site.later {
+        if k < levels || site.later || cut.only_deeper_than_mm > 0.0 {
             block.cut(&profile, &out.moves()[before..]);
         }
     }
@@ -107,7 +109,7 @@ fn is_allowed(sample: &Sample, z: f64) -> bool {
 }
 
 /// The spans of a row at level `z`: the tip may be there, and there is wood to remove.
-fn spans(survey: &Survey, z: f64, diameter_mm: f64) -> Vec<Span> {
+fn spans(survey: &Survey, z: f64, cut: &Rough, diameter_mm: f64) -> Vec<Span> {
     let mut spans = Vec::new();
     let mut open: Option<(f64, f64)> = None;
     let mut close = |open: &mut Option<(f64, f64)>| {
@@ -120,7 +122,7 @@ fn spans(survey: &Survey, z: f64, diameter_mm: f64) -> Vec<Span> {
     for (sample, &wood) in survey.allowed.iter().zip(&survey.wood_mm) {
         if !is_allowed(sample, z) {
             close(&mut open);
-        } else if wood > z + FILM_MM {
+        } else if wood > z + FILM_MM && wood - sample.z > cut.only_deeper_than_mm {
             // A gap without wood shorter than the cutter is not worth lifting.
             if open.is_some_and(|(_, to)| sample.s - to > diameter_mm) {
                 close(&mut open);
