@@ -70,15 +70,16 @@ impl Fan {
                 let coarse = coarse + ROUND_OFF * (top.abs() + r);
                 let w2 = r2 - (dx * dx + dy * dy);
                 let least = (STEEP_CHORD * r) * (STEEP_CHORD * r);
-                let w = if w2 > least { w2 } else { least }.sqrt();
+                let clear = if w2 > least { w2 } else { least };
+                let w = clear.sqrt();
                 let per_w = 1.0 / w;
                 let fall = (self.slope_x[lane] - dx * per_w).abs()
                     + (self.slope_y[lane] - dy * per_w).abs();
                 let lift = self.lift[lane];
-                let fine = lift - r + w + half * fall;
+                // Too close to the rim this bound goes out of sight; a test would cost the vectors.
+                let fine = lift - r + w + half * fall + (clear - w2) * 1e30;
                 let fine = fine + ROUND_OFF * (lift.abs() + r + half * fall);
-                let usable = w2 > least && fine < coarse;
-                if usable { fine } else { coarse }
+                if fine < coarse { fine } else { coarse }
             } else {
                 top
             };
