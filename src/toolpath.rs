@@ -126,6 +126,9 @@ pub enum ToolpathError {
     Fault(#[from] PathFault),
 }
 
+/// Shortest span of a roughing pass, as a fraction of the cutter's diameter.
+const SHORTEST_SPAN_PER_DIAMETER: f64 = 0.3;
+
 /// Most points that one operation may compute.
 const MOST_SAMPLES: f64 = 1e8;
 
@@ -200,6 +203,7 @@ pub fn plan(
                     stepover_mm,
                     angle_rad,
                     only_deeper_than_mm: 0.0,
+                    shortest_mm: SHORTEST_SPAN_PER_DIAMETER * operation.cutter.diameter_mm,
                 };
                 rough::rough(&site, &cut, &mut block, &mut out)?;
             }
@@ -261,6 +265,12 @@ fn notes(site: &Site, out: &Emitter) -> Vec<String> {
         let n = out.skipped();
         notes.push(format!(
             "{who}: {n} places are too small to ramp into and stay uncut; take a thinner cutter"
+        ));
+    }
+    if out.deepest_pass_mm() > 0.0 {
+        notes.push(format!(
+            "{who}: goes {:.1} mm deep at once in pockets hardly wider than the cutter; take a thinner one",
+            out.deepest_pass_mm()
         ));
     }
     let depth = moves.iter().map(|m| -m.to.z).fold(0.0, f64::max);

@@ -20,11 +20,13 @@ pub(super) struct Emitter<'a> {
     moves: Vec<Move>,
     /// Chains left out because they have no room to ramp.
     skipped: usize,
+    /// Depth of a pass that is deeper than one should be, mm; else 0.
+    deepest_pass_mm: f64,
 }
 
 impl<'a> Emitter<'a> {
     pub(super) fn new(job: &'a Job, operation: &'a Operation) -> Self {
-        Self { job, operation, moves: Vec::new(), skipped: 0 }
+        Self { job, operation, moves: Vec::new(), skipped: 0, deepest_pass_mm: 0.0 }
     }
 
     /// The moves so far: they start and end at safe Z.
@@ -35,6 +37,15 @@ impl<'a> Emitter<'a> {
     /// Number of chains left out.
     pub(super) fn skipped(&self) -> usize {
         self.skipped
+    }
+
+    /// Depth of a pass that is deeper than one should be, mm; 0 when there is none.
+    pub(super) fn deepest_pass_mm(&self) -> f64 {
+        self.deepest_pass_mm
+    }
+
+    pub(super) fn note_deep_pass(&mut self, depth_mm: f64) {
+        self.deepest_pass_mm = self.deepest_pass_mm.max(depth_mm);
     }
 
     pub(super) fn into_moves(self) -> Vec<Move> {

@@ -27,9 +27,11 @@ const TOP_GAP_MM: f64 = 0.1;
 /// Deepest cut of a finishing pass, in diameters; deeper wood is taken down in levels first.
 const DEEPEST_PASS_PER_DIAMETER: f64 = 1.0;
 /// Wood that those levels leave on the target, in diameters.
-const LEVELS_LEAVE_PER_DIAMETER: f64 = 0.1;
+const LEVELS_LEAVE_PER_DIAMETER: f64 = 0.05;
 /// Distance of the passes of those levels, in diameters.
-const LEVELS_STEPOVER_PER_DIAMETER: f64 = 0.4;
+const LEVELS_STEPOVER_PER_DIAMETER: f64 = 0.25;
+/// Shortest pass of those levels, in diameters: ramped back and forth.
+const LEVELS_SHORTEST_PER_DIAMETER: f64 = 0.1;
 
 /// How far beyond its work a pass begins and ends when the row has room: space to ramp, mm.
 const ENTRY_ROOM_MM: f64 = 2.0;
@@ -76,6 +78,7 @@ pub(super) fn raster(
     rows.extend(slanted_rim(&bounds, angle_rad));
     let spans: Vec<Vec<Span>> =
         rows.into_par_iter().map(|row| spans(site, &row, tracer.trace(row.from, row.to))).collect();
+    out.note_deep_pass(deepest_pass_mm(&spans, block, site.operation.cutter.diameter_mm));
     let link = |a: DVec3, b: DVec3| {
         let lift = lift_seconds(site.job, site.operation, a, b);
         if feed_seconds(site.operation, &[a, b]) > lift {
@@ -101,7 +104,8 @@ pub(super) fn raster(
     Ok(())
 }
 
-/// Takes wood that is too deep for one pass down in levels.
+/// Takes wood that is too deep for one pass down in levels: along the passes and, for what is left in slots
+/// that lie across them, at right angles.
 fn clear_deep_wood(
     site: &Site,
     angle_rad: f64,
@@ -109,14 +113,26 @@ fn clear_deep_wood(
     out: &mut Emitter,
 ) -> Result<(), ToolpathError> {
     let diameter = site.operation.cutter.diameter_mm;
-    let levels = Rough {
-        leave_mm: LEVELS_LEAVE_PER_DIAMETER * diameter,
-        stepdown_mm: site.job.stock.wood.stepdown_per_diameter * diameter,
-        stepover_mm: LEVELS_STEPOVER_PER_DIAMETER * diameter,
-        angle_rad,
-        only_deeper_than_mm: DEEPEST_PASS_PER_DIAMETER * diameter,
-    };
-    rough(site, &levels, block, out)
+    for turn in [0.0, std::f64::consts::FRAC_PI_2] {
+        let levels = Rough {
+            leave_mm: LEVELS_LEAVE_PER_DIAMETER * diameter,
+            stepdown_mm: site.job.stock.wood.stepdown_per_diameter * diameter,
+            stepover_mm: LEVELS_STEPOVER_PER_DIAMETER * diameter,
+            angle_rad: angle_rad + turn,
+            only_deeper_than_mm: DEEPEST_PASS_PER_DIAMETER * diameter,
+            shortest_mm: LEVELS_SHORTEST_PER_DIAMETER * diameter,
+        };
+        rough(site, &levels, block, out)?;
+    }
+    Ok(())
+}
+
+/// The deepest wood on the axis of the cutter along the passes, where it is deeper than one pass should take; else 0.
+fn deepest_pass_mm(spans: &[Vec<Span>], block: &Block, diameter_mm: f64) -> f64 {
+    let depth = |p: &DVec3| block.field().height_at(p.truncate()).map_or(0.0, |top| top - p.z);
+    let deepest = spans.iter().flatten().flatten().map(depth).fold(0.0, f64::max);
+    // The levels leave steps: half a diameter more is no cause for alarm.
+    if deepest > (DEEPEST_PASS_PER_DIAMETER + 0.5) * diameter_mm { deepest } else { 0.0 }
 }
 
 /// Lifts the path off the stock's top where it does not go below it.

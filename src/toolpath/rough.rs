@@ -11,8 +11,6 @@ use crate::offset::Dropper;
 use crate::stock::Block;
 use rayon::prelude::*;
 
-/// Shortest span worth an entry, as a fraction of the cutter's diameter.
-const SHORTEST_SPAN_PER_DIAMETER: f64 = 0.3;
 /// Wood lower than this above a level is left to later operations, mm.
 const FILM_MM: f64 = 0.01;
 
@@ -25,6 +23,8 @@ pub(super) struct Rough {
     pub(super) angle_rad: f64,
     /// Only places with more wood than this above the lowest allowed height are worked on, mm; 0 = all.
     pub(super) only_deeper_than_mm: f64,
+    /// Shortest span worth an entry, mm.
+    pub(super) shortest_mm: f64,
 }
 
 /// A row with what is known along it, at the same places.
@@ -114,7 +114,7 @@ fn spans(survey: &Survey, z: f64, cut: &Rough, diameter_mm: f64) -> Vec<Span> {
     let mut open: Option<(f64, f64)> = None;
     let mut close = |open: &mut Option<(f64, f64)>| {
         if let Some((from, to)) = open.take()
-            && to - from >= SHORTEST_SPAN_PER_DIAMETER * diameter_mm
+            && to - from >= cut.shortest_mm
         {
             spans.push([from, to].map(|s| point(&survey.row, s).extend(z)).to_vec());
         }

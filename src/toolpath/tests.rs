@@ -5,7 +5,7 @@ use super::fixture::{Bump, cutter, job, raster, relief, rough};
 use super::trace::{Sample, Tracer};
 use super::*;
 use crate::cutter::Profile;
-use crate::geom::{DVec2, DVec3};
+use crate::geom::{DVec2, DVec3, Grid};
 use crate::job::{CutterShape, Stepover};
 use crate::offset::Dropper;
 use proptest::prelude::*;
@@ -447,4 +447,38 @@ fn broken_paths_are_found_out() {
         }),
         PathFault::OutsideStock { .. }
     ));
+}
+
+#[test]
+fn a_pocket_that_roughing_did_not_reach_is_not_cut_at_full_depth_at_once() {
+    let (flat, ball) = (cutter(CutterShape::Flat, 6.0), cutter(CutterShape::Ball, 3.0));
+    let finish = raster(ball, Stepover::Plan(0.4), 0.0);
+    let job = job(30.0, 20.0, 12.0, 0.2, vec![rough(flat, 0.5, 1.5), finish]);
+    let (width, depth) = (4.2, 7.0);
+    let pocket = |p: DVec2| {
+        let inside = (p.x - 15.0).abs() < width / 2.0 && (4.0..16.0).contains(&p.y);
+        if inside { -depth } else { 0.0 }
+    };
+    let grid = Grid::covering(DVec2::ZERO, 30.0, 20.0, 0.2).unwrap();
+    let target = Heightfield::from_fn(grid, pocket);
+    let paths = plan_quietly(&job, &target);
+    let path = paths.last().unwrap();
+    assert_eq!(path.name, "finish-ball-3");
+    assert_no_gouge(&paths, &target);
+    // The flat cutter does not fit in at all: what the ball meets is the whole pocket.
+    let mut wood = Heightfield::flat(grid, 0.0);
+    let (mut deepest, mut lowest) = (0.0_f64, 0.0_f64);
+    for m in &path.moves {
+        if !m.is_rapid() {
+            let n = (m.length_mm() / 0.1).ceil().max(1.0);
+            for tip in (0..=n as usize).map(|k| m.from + (m.to - m.from) * (k as f64 / n)) {
+                let above = wood.height_at(tip.truncate()).unwrap_or(f64::MIN);
+                deepest = deepest.max(above - tip.z);
+            }
+            lowest = lowest.min(m.to.z);
+        }
+        lower(&mut wood, &Profile::of(&path.cutter), m);
+    }
+    assert!(lowest < -depth + 0.01, "the pocket is finished: {lowest}");
+    assert!(deepest <= 3.0 + 0.3, "a pass takes {deepest} mm at once");
 }
