@@ -21,7 +21,8 @@ pub(super) struct Rough {
     pub(super) stepdown_mm: f64,
     pub(super) stepover_mm: f64,
     pub(super) angle_rad: f64,
-    /// Only places with more wood than this above the lowest allowed height are worked on, mm; 0 = all.
+    /// Only places with more wood than this, on the cutter's axis, above the lowest allowed height are worked on, mm;
+    /// 0 = all.
     pub(super) only_deeper_than_mm: f64,
     /// Shortest span worth an entry, mm.
     pub(super) shortest_mm: f64,
@@ -34,6 +35,8 @@ struct Survey {
     allowed: Vec<Sample>,
     /// Highest wood under the cutter before this operation.
     wood_mm: Vec<f64>,
+    /// True where this operation is to work.
+    wanted: Vec<bool>,
 }
 
 /// Plans the levels from the top to the lowest height that the allowance leaves, in equal steps of at most
@@ -66,7 +69,17 @@ pub(super) fn rough(
             } else {
                 allowed.iter().map(wood).collect()
             };
-            Survey { row, allowed, wood_mm }
+            // On the axis: beside a wall the disc of the cutter always meets high wood, but only a sliver of it.
+            let deep = |s: &Sample| {
+                let top = block.field().height_at(point(&row, s.s));
+                top.is_some_and(|top| top - s.z > cut.only_deeper_than_mm)
+            };
+            let wanted = if cut.only_deeper_than_mm > 0.0 {
+                allowed.iter().map(deep).collect()
+            } else {
+                vec![true; allowed.len()]
+            };
+            Survey { row, allowed, wood_mm, wanted }
         })
         .collect();
     let lowest = surveys.iter().flat_map(|s| &s.allowed).map(|p| p.z).fold(f64::INFINITY, f64::min);
@@ -119,10 +132,11 @@ fn spans(survey: &Survey, z: f64, cut: &Rough, diameter_mm: f64) -> Vec<Span> {
             spans.push([from, to].map(|s| point(&survey.row, s).extend(z)).to_vec());
         }
     };
-    for (sample, &wood) in survey.allowed.iter().zip(&survey.wood_mm) {
+    for ((sample, &wood), &wanted) in survey.allowed.iter().zip(&survey.wood_mm).zip(&survey.wanted)
+    {
         if !is_allowed(sample, z) {
             close(&mut open);
-        } else if wood > z + FILM_MM && wood - sample.z > cut.only_deeper_than_mm {
+        } else if wood > z + FILM_MM && wanted {
             // A gap without wood shorter than the cutter is not worth lifting.
             if open.is_some_and(|(_, to)| sample.s - to > diameter_mm) {
                 close(&mut open);
