@@ -68,6 +68,7 @@ impl<E: Into<anyhow::Error>> From<E> for Stop {
 /// Runs the command that the arguments ask for.
 pub fn main() -> ExitCode {
     let cli = Cli::parse();
+    files::watch_signals();
     if let Some(n) = cli.threads {
         // Fails only when a pool exists already, and nothing has used one yet.
         let _ = rayon::ThreadPoolBuilder::new().num_threads(usize::from(n)).build_global();

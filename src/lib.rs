@@ -162,12 +162,11 @@ pub fn design(
     enter("merge");
     let raised_notes = raised.notes.clone();
     let relief = relief::merge(&job, &outlines, raised.surfaces, &grid)?;
-    let notes =
-        [&artwork.notes, &job.notes, &placed.notes, &outlines.notes, &raised_notes, &relief.notes]
-            .into_iter()
-            .flatten()
-            .cloned()
-            .collect();
+    let notes = [&job.notes, &placed.notes, &outlines.notes, &raised_notes, &relief.notes]
+        .into_iter()
+        .flatten()
+        .cloned()
+        .collect();
     Ok(Design { job, outlines, relief, notes })
 }
 

@@ -272,7 +272,11 @@ fn files_that_are_not_there_are_named() {
     refused(&desk, &["carve", "nothing.toml"], 1, &["nothing.toml"]);
     refused(&desk, &["carve", "nothing.svg"], 1, &["nothing.svg"]);
     let job = job_with("leaf.svg", "lost.svg");
-    refused(&job, &["carve", "leaf.toml"], 1, &["lost.svg"]);
+    refused(&job, &["carve", "leaf.toml"], 1, &["lost.svg", "leaf.toml:4:8"]);
+    let folder = job_with("leaf.svg", ".");
+    refused(&folder, &["carve", "leaf.toml"], 1, &["folder", "leaf.toml:4:8"]);
+    let fonts = job_with("file = \"leaf.svg\"", "file = \"leaf.svg\"\nfont_dirs = [\"lost\"]");
+    refused(&fonts, &["check", "leaf.toml"], 1, &["lost", "leaf.toml:5:13"]);
     let machine = job_with("title = \"Leaf\"", "machine = \"my/router.toml\"");
     refused(&machine, &["carve", "leaf.toml"], 1, &["my/router.toml"]);
 }
@@ -382,6 +386,34 @@ fn a_folder_that_cannot_be_written_is_named() {
     refused(&desk, &["carve", "leaf.toml", "--out", "in-the-way/out"], 1, &["in-the-way"]);
     refused(&desk, &["carve", "leaf.toml", "--out", "in-the-way"], 1, &["in-the-way"]);
     refused(&desk, &["carve", "leaf.toml", "--out", "/proc/relievo"], 1, &["/proc/relievo"]);
+}
+
+#[cfg(unix)]
+#[test]
+fn devices_and_pipes_are_refused_without_waiting() {
+    let desk = job_with("leaf.svg", "/dev/zero");
+    refused(&desk, &["check", "leaf.toml"], 1, &["/dev/zero"]);
+}
+
+#[test]
+fn a_cutter_may_be_called_what_carvers_call_it() {
+    let cutter = "cutter = { name = '1/8\" ball', shape = \"ball\", diameter_mm = 3.175, flute_mm = 12, stickout_mm = 30 }";
+    let desk = job_with("cutter = \"ball-3\"", cutter);
+    let out = desk.run(&["carve", "leaf.toml"]);
+    assert_eq!(out.status.code(), Some(0), "{}", stderr(&out));
+    assert!(desk.files().contains_key("leaf-carving/2-finish-1-8--ball.nc"));
+}
+
+#[test]
+fn every_note_is_said_once() {
+    let desk = leaf_desk();
+    desk.put(
+        "leaf.svg",
+        LEAF.replace("</svg>", "<path id='op' d='M0 0 L10 10' fill='none'/></svg>"),
+    );
+    let out = desk.run(&["carve", "leaf.toml"]);
+    let said = String::from_utf8_lossy(&out.stdout);
+    assert_eq!(said.matches("'op'").count(), 1, "{said}");
 }
 
 #[test]

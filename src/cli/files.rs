@@ -4,26 +4,32 @@ use super::{INTERRUPTED, observe};
 use anyhow::{Context, Result, bail};
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// Largest input file taken on, bytes.
 const LARGEST_INPUT: u64 = 512 << 20;
 
 /// Reads a whole input file.
 pub(super) fn read(path: &Path) -> Result<Vec<u8>> {
-    let meta = fs::metadata(path).with_context(|| format!("cannot read {}", path.display()))?;
+    use std::io::Read;
+    let name = path.display();
+    // Looked at before it is opened: opening a pipe would wait for its other end.
+    let meta = fs::metadata(path).with_context(|| format!("cannot read {name}"))?;
     if meta.is_dir() {
-        bail!("{} is a folder; give a file", path.display());
+        bail!("{name} is a folder; give a file");
     }
-    if meta.len() > LARGEST_INPUT {
-        bail!(
-            "{} has {} MiB, more than the {} MiB that are read; simplify it",
-            path.display(),
-            meta.len() >> 20,
-            LARGEST_INPUT >> 20
-        );
+    if !meta.is_file() {
+        bail!("{name} is a device or a pipe; give a file");
     }
-    fs::read(path).with_context(|| format!("cannot read {}", path.display()))
+    let mut bytes = Vec::new();
+    let file = fs::File::open(path).with_context(|| format!("cannot read {name}"))?;
+    file.take(LARGEST_INPUT + 1)
+        .read_to_end(&mut bytes)
+        .with_context(|| format!("cannot read {name}"))?;
+    if bytes.len() as u64 > LARGEST_INPUT {
+        bail!("{name} has more than the {} MiB that are read; simplify it", LARGEST_INPUT >> 20);
+    }
+    Ok(bytes)
 }
 
 /// Reads a whole text file.
@@ -59,11 +65,31 @@ pub(super) fn name_from(folder: &Path, file: &Path) -> Result<String> {
 pub(super) struct Outputs {
     folder: PathBuf,
     names: Vec<String>,
-    staging: Arc<Mutex<Staging>>,
+    staging: Staging,
+}
+
+/// What this run has begun. A signal arrives on another thread and has nothing else to know it by.
+static BEGUN: Mutex<Option<Staging>> = Mutex::new(None);
+
+fn begun() -> MutexGuard<'static, Option<Staging>> {
+    BEGUN.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// From here on Ctrl-C, SIGTERM and SIGHUP take away what was begun and end the process with exit code 130.
+pub(super) fn watch_signals() {
+    // Fails only when a handler is set already.
+    let _ = ctrlc::set_handler(|| {
+        // Waits while files are being moved in: that is never cut short.
+        if let Some(staging) = begun().take() {
+            staging.remove();
+        }
+        observe::complain("interrupted: nothing was written");
+        std::process::exit(i32::from(INTERRUPTED));
+    });
 }
 
 /// What has to go when the run ends early: by an error, or by a signal on another thread.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 struct Staging {
     path: PathBuf,
     /// The folders that this run made, innermost first.
@@ -80,33 +106,24 @@ impl Staging {
 }
 
 impl Outputs {
-    /// Prepares `folder` (made when missing); fails when it cannot be written. From here on Ctrl-C,
-    /// SIGTERM and SIGHUP take away what was begun and end the process with exit code 130.
+    /// Prepares `folder` (made when missing); fails when it cannot be written.
     pub(super) fn prepare(folder: &Path) -> Result<Self> {
         let missing = |p: &&Path| !p.as_os_str().is_empty() && !p.exists();
         let made = folder.ancestors().take_while(missing).map(Path::to_path_buf).collect();
         let cure =
             || format!("cannot write into {}; choose another folder with --out", folder.display());
-        let path = folder.join(format!(".relievo-{}", std::process::id()));
-        let staging = Arc::new(Mutex::new(Staging { path: path.clone(), made }));
+        let staging =
+            Staging { path: folder.join(format!(".relievo-{}", std::process::id())), made };
+        *begun() = Some(staging.clone());
         let outputs = Self { folder: folder.to_path_buf(), names: Vec::new(), staging };
-        fs::create_dir_all(&path).with_context(cure)?;
-        let for_signals = Arc::clone(&outputs.staging);
-        // Fails only when a handler is set already: then the first run of this process has set it.
-        let _ = ctrlc::set_handler(move || {
-            // Waits while files are being moved in: that is never cut short.
-            let staging = for_signals.lock().unwrap_or_else(PoisonError::into_inner);
-            staging.remove();
-            observe::complain("interrupted: nothing was written");
-            std::process::exit(i32::from(INTERRUPTED));
-        });
+        fs::create_dir_all(&outputs.staging.path).with_context(cure)?;
         Ok(outputs)
     }
 
     /// Adds one file.
     pub(super) fn add(&mut self, name: &str, bytes: &[u8]) -> Result<()> {
         use std::io::Write;
-        let path = self.staged(name);
+        let path = self.staging.path.join(name);
         let write = || -> std::io::Result<()> {
             let mut file = fs::File::create(&path)?;
             file.write_all(bytes)?;
@@ -120,9 +137,8 @@ impl Outputs {
     /// Moves all files in and takes away programs of an earlier run that this one did not make, so that
     /// the folder never holds programs of two different jobs.
     pub(super) fn commit(self) -> Result<()> {
-        let staging = Arc::clone(&self.staging);
-        let held = staging.lock().unwrap_or_else(PoisonError::into_inner); // signals wait
-        let done = self.move_in(&held.path);
+        let held = begun(); // signals wait
+        let done = self.move_in(&self.staging.path);
         drop(held);
         done
     }
@@ -166,10 +182,6 @@ impl Outputs {
         done
     }
 
-    fn staged(&self, name: &str) -> PathBuf {
-        self.staging.lock().unwrap_or_else(PoisonError::into_inner).path.join(name)
-    }
-
     /// Programs in the destination that an earlier run wrote and this one does not replace.
     pub(super) fn earlier_programs(&self) -> Result<Vec<PathBuf>> {
         let mut stale = Vec::new();
@@ -199,7 +211,8 @@ fn starts_with_our_header(path: &Path) -> bool {
 impl Drop for Outputs {
     fn drop(&mut self) {
         // After a commit the staging folder is empty and the destination is not.
-        self.staging.lock().unwrap_or_else(PoisonError::into_inner).remove();
+        *begun() = None;
+        self.staging.remove();
     }
 }
 

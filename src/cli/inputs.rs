@@ -42,7 +42,19 @@ pub(super) fn load(path: &Path) -> Result<Input> {
             path.display()
         ),
     };
-    let artwork = read_artwork(&artwork_file, &draft.artwork().font_dirs, beside)?;
+    let bytes = match files::read(&artwork_file) {
+        Err(e) if artwork_file != path => {
+            return Err(draft.unreadable_artwork(&format!("{e:#}")).into());
+        }
+        bytes => bytes?,
+    };
+    let dirs: Vec<PathBuf> = draft.artwork().font_dirs.iter().map(|d| beside.join(d)).collect();
+    if let Some(lost) = dirs.iter().find(|d| !d.is_dir()) {
+        let message = format!("font folder {} is not there", lost.display());
+        return Err(draft.unreadable_fonts(&message).into());
+    }
+    let fonts = if needs_fonts(&bytes) { load_fonts(&dirs) } else { Fonts::none() };
+    let artwork = read_svg(&bytes, &fonts).with_context(|| artwork_file.display().to_string())?;
     Ok(Input { draft, artwork, artwork_file, library })
 }
 
@@ -58,28 +70,19 @@ pub(super) fn library(folder: &Path) -> Result<Library> {
     Ok(library)
 }
 
-fn read_artwork(path: &Path, font_dirs: &[String], beside: &Path) -> Result<Artwork> {
-    let bytes = files::read(path)?;
-    let fonts = if needs_fonts(&bytes) { load_fonts(font_dirs, beside)? } else { Fonts::none() };
-    read_svg(&bytes, &fonts).with_context(|| path.display().to_string())
-}
-
 /// Scanning the system's fonts takes long: it is done only for artwork that may hold text.
 fn needs_fonts(bytes: &[u8]) -> bool {
     bytes.starts_with(&[0x1f, 0x8b]) || bytes.windows(4).any(|w| w == b"text")
 }
 
-fn load_fonts(dirs: &[String], beside: &Path) -> Result<Fonts> {
+/// The fonts of some folders; of the system without any.
+fn load_fonts(dirs: &[PathBuf]) -> Fonts {
     let mut database = usvg::fontdb::Database::new();
     if dirs.is_empty() {
         database.load_system_fonts();
     }
     for dir in dirs {
-        let dir = beside.join(dir);
-        if !dir.is_dir() {
-            bail!("font folder {} is not there; correct artwork.font_dirs", dir.display());
-        }
-        database.load_fonts_dir(&dir);
+        database.load_fonts_dir(dir);
     }
-    Ok(Fonts::from_database(database))
+    Fonts::from_database(database)
 }

@@ -11,9 +11,15 @@ use crate::toolpath::Toolpath;
 /// Longest line that GRBL takes, without the line end.
 pub const MAX_LINE: usize = 79;
 
-/// Name of a program's file without extension: `1-rough-flat-6` for the first.
+/// Longest name of a cutter or operation in a file's name, characters.
+const MAX_STEM: usize = 60;
+
+/// Name of a program's file without extension: `1-rough-flat-6` for the first. What is not a plain ASCII letter or
+/// digit in the cutter's name (`1/8" ball`) becomes a dash.
 pub fn file_stem(number: usize, path: &Toolpath) -> String {
-    format!("{number}-{}", path.name)
+    let plain = |c: char| if c.is_ascii_alphanumeric() || c == '.' { c } else { '-' };
+    let name: String = path.name.chars().take(MAX_STEM).map(plain).collect();
+    format!("{number}-{}", name.trim_matches(['-', '.']))
 }
 
 /// The comment lines at the head of a program that takes `seconds`; always the same number of lines.

@@ -321,7 +321,7 @@ pub(super) static BACKGROUND: Section = Section {
         key(
             "leave_mm",
             mm(0.1, LENGTH),
-            Rule("widest cutter + 1"),
+            Rule("widest cutter, twice what it leaves, + 1"),
             "how far around the artwork the background is cleared",
         ),
     ],

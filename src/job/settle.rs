@@ -4,6 +4,7 @@
 use super::draft::{BackgroundDraft, Draft};
 use super::error::JobError;
 use super::keys::rule;
+use super::operation::{KindDraft, OperationDraft};
 use super::types::{Background, Fit, Found, Job, Place, ReliefSpec, Stock};
 use crate::geom::{Bounds, DVec2, Grid};
 
@@ -55,6 +56,20 @@ impl Draft {
             machine: self.machine,
             artwork: self.artwork,
         })
+    }
+
+    /// The error for artwork that cannot be read, at the place where the job names it.
+    pub fn unreadable_artwork(&self, message: &str) -> JobError {
+        let help = "a path is seen from the job file's folder";
+        let span = self.source.span_of(&["artwork.file"]);
+        JobError::Unreadable(self.source.fault(span, message, "", help))
+    }
+
+    /// The error for a font folder that cannot be read, at the place where the job names it.
+    pub fn unreadable_fonts(&self, message: &str) -> JobError {
+        let help = "a path is seen from the job file's folder";
+        let span = self.source.span_of(&["artwork.font_dirs", "artwork.file"]);
+        JobError::Unreadable(self.source.fault(span, message, "", help))
     }
 
     /// Refuses what does not go together; points at the first of `paths` that the job gives.
@@ -128,8 +143,12 @@ impl Draft {
             BackgroundDraft::Frame(frame) => Background::Frame(frame),
             BackgroundDraft::Leave(Some(leave)) => Background::Leave(leave),
             BackgroundDraft::Leave(None) => {
-                let widest =
-                    self.operations.iter().map(|op| op.cutter.diameter_mm).fold(0.0, f64::max);
+                // Roughing keeps its allowance from both walls of the moat.
+                let needs = |op: &OperationDraft| match op.kind {
+                    KindDraft::Rough => op.cutter.diameter_mm + 2.0 * op.leave_mm,
+                    KindDraft::Raster => op.cutter.diameter_mm,
+                };
+                let widest = self.operations.iter().map(needs).fold(0.0, f64::max);
                 Background::Leave(widest + rule::LEAVE_EXTRA_MM)
             }
         }
@@ -156,8 +175,9 @@ impl Draft {
             }
         };
         let step = rule::STOCK_STEP_MM;
-        // Divided by a whole number, so that 170 stays 170.
-        let up = |v: f64| (v / step - 1e-6).ceil() / (1.0 / step).round();
+        // A thousandth of a step is round-off of the artwork's single-precision curves. Divided by a whole
+        // number, so that 170 stays 170.
+        let up = |v: f64| (v / step - 1e-3).ceil() / (1.0 / step).round();
         Stock {
             width_mm: self.stock.width_mm.unwrap_or_else(|| up(needed.x)),
             height_mm: self.stock.height_mm.unwrap_or_else(|| up(needed.y)),

@@ -133,8 +133,8 @@ fn the_whole_example_is_read() {
     assert!((job.artwork_unit_mm - 0.7).abs() < 1e-12);
     assert_eq!(job.artwork_size_mm, DVec2::new(140.0, 70.0));
     assert_eq!(job.artwork_lower_left_mm, DVec2::new(-70.0, -35.0));
-    // The widest cutter is 6 mm.
-    assert_eq!(job.relief.background, Background::Leave(7.0));
+    // The widest cutter is 6 mm and leaves 0.7 mm on both walls of its moat.
+    assert_eq!(job.relief.background, Background::Leave(8.4));
     assert_eq!(job.tolerance, Tolerance { scallop_mm: 0.02, ..Tolerance::default() });
     assert_eq!((job.safe_z_mm, job.clearance_mm), (6.0, 1.0));
     let petals = &job.layers[1];
