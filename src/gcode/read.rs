@@ -11,7 +11,7 @@ mod words;
 use crate::geom::arc::{Plane, Turn, chords};
 use crate::geom::{DVec2, DVec3, Move, MoveKind};
 use crate::job::Machine;
-use words::{Distance, Line, Motion};
+use words::{Distance, Line, Motion, Spindle};
 
 /// A program as read.
 #[derive(Debug, Clone)]
@@ -25,6 +25,8 @@ pub struct Program {
     /// Line of the first motion in X or Y that comes before a motion in Z alone. The machine's height is
     /// unknown until then, so such a motion may run through wood.
     pub blind_line: Option<u32>,
+    /// Line and height (mm) of the first Z: the tip comes to it from an unknown height.
+    pub first_z: Option<(u32, f64)>,
 }
 
 /// Something that is not a move.
@@ -46,6 +48,8 @@ pub enum EventKind {
     SpindleOn {
         /// Speed, 1/min.
         rpm: f64,
+        /// True after M4: the cutter turns backwards.
+        reversed: bool,
     },
     /// M5.
     SpindleOff,
@@ -176,7 +180,7 @@ struct Reader<'a> {
     distance: Distance,
     feed_mm_per_min: Option<f64>,
     rpm: f64,
-    spindle: bool,
+    spindle: Spindle,
     ended: bool,
     arc_tolerance_mm: f64,
 }
@@ -184,7 +188,13 @@ struct Reader<'a> {
 impl Reader<'_> {
     fn new(machine: &Machine, start: DVec3) -> Self {
         Self {
-            program: Program { moves: Vec::new(), events: Vec::new(), lines: 0, blind_line: None },
+            program: Program {
+                moves: Vec::new(),
+                events: Vec::new(),
+                lines: 0,
+                blind_line: None,
+                first_z: None,
+            },
             line: Line::default(),
             text: &[],
             number: 0,
@@ -196,7 +206,7 @@ impl Reader<'_> {
             distance: Distance::Absolute,
             feed_mm_per_min: None,
             rpm: 0.0,
-            spindle: false,
+            spindle: Spindle::Off,
             ended: false,
             arc_tolerance_mm: machine.arc_tolerance_mm,
         }
@@ -285,16 +295,15 @@ impl Reader<'_> {
             }
             self.rpm = s;
         }
-        match self.line.spindle {
-            Some(on) => {
-                self.spindle = on;
-                let rpm = self.rpm;
-                self.event(if on { EventKind::SpindleOn { rpm } } else { EventKind::SpindleOff });
+        if let Some(spindle) = self.line.spindle {
+            self.spindle = spindle;
+            if spindle == Spindle::Off {
+                self.event(EventKind::SpindleOff);
             }
-            None if self.spindle && speed.is_some() => {
-                self.event(EventKind::SpindleOn { rpm: self.rpm });
-            }
-            None => {}
+        }
+        if self.spindle != Spindle::Off && (speed.is_some() || self.line.spindle.is_some()) {
+            let reversed = self.spindle == Spindle::Reversed;
+            self.event(EventKind::SpindleOn { rpm: self.rpm, reversed });
         }
         Ok(())
     }
@@ -328,6 +337,9 @@ impl Reader<'_> {
             }
         }
         let to = DVec3::from_array(to);
+        if axes[2].is_some() {
+            self.program.first_z.get_or_insert((self.number, to.z));
+        }
         let kind = match (self.motion, self.feed_mm_per_min) {
             (Motion::Rapid, _) => MoveKind::Rapid,
             (_, Some(feed_mm_per_min)) => MoveKind::Feed { feed_mm_per_min },

@@ -21,18 +21,26 @@ pub enum FailureKind {
     Holder,
     /// The program is larger than the machine.
     Travel,
-    /// A feed that the machine cannot run.
+    /// A feed that the machine cannot run, or one in wood that no operation of the cutter asks for.
     Feed,
-    /// A spindle speed that the spindle does not have.
+    /// A spindle speed that the spindle does not have, or that no operation of the cutter asks for.
     SpindleSpeed,
     /// The tip is in wood and the spindle does not turn.
     SpindleOff,
+    /// The spindle is started backwards (M4).
+    SpindleReversed,
     /// The tip comes into wood before the spindle had time to start.
     NoDwell,
     /// The tip goes below the stock.
     ThroughBottom,
-    /// The program moves sideways before it has set its height.
+    /// The program moves sideways before it has set its height, or sets it first below safe Z.
     BlindStart,
+    /// A rapid moves sideways below safe Z.
+    LowRapid,
+    /// The tip goes below the stock's top beside the stock, where clamps are.
+    OutsideStock,
+    /// The program ends below safe Z, or the spindle stops while the tip is below the stock's top.
+    EndInWood,
     /// The program does not end with the spindle off and M2 or M30.
     NoEnd,
     /// Too much wood is left where a cutter reaches (a strict job only).
@@ -140,10 +148,10 @@ fn sentence(f: &Failure) -> String {
             format!("needs {a:.2} mm of travel along one axis, the machine has {l:.2}; carve a smaller piece")
         }
         FailureKind::Feed => {
-            format!("a feed of {a:.0} mm/min, the machine's axes do {l:.0}; lower the feed")
+            format!("a feed of {a:.0} mm/min, the machine and the job's operations with this cutter allow {l:.0}; lower the feed")
         }
         FailureKind::SpindleSpeed => {
-            format!("a spindle speed of {a:.0} 1/min, the spindle's limit is {l:.0}; change S")
+            format!("a spindle speed of {a:.0} 1/min, the spindle and the job's operations with this cutter ask for {l:.0}; change S")
         }
         FailureKind::SpindleOff => {
             format!("cuts {a:.2} mm deep while the spindle is off; put M3 with a speed before it")
@@ -154,10 +162,25 @@ fn sentence(f: &Failure) -> String {
         FailureKind::ThroughBottom => format!(
             "the tip goes {a:.2} mm below the stock's underside; use thicker stock or a shallower relief"
         ),
+        FailureKind::SpindleReversed => {
+            "M4 turns the cutter backwards, which burns wood and breaks cutters; write M3".to_owned()
+        }
         FailureKind::BlindStart => {
-            "moves in X or Y before it has set Z, wherever the tip stands; begin with G0 Z at safe height"
+            "moves in X or Y before it has set Z, or sets Z below safe Z first, wherever the tip stands; \
+             begin with G0 Z at safe height"
                 .to_owned()
         }
+        FailureKind::LowRapid => {
+            format!("a rapid moves sideways {a:.2} mm below safe Z ({l:.2}); retract to safe Z before it")
+        }
+        FailureKind::OutsideStock => format!(
+            "the tip goes {a:.2} mm outside the stock's rectangle below its top, where clamps are; \
+             keep the path over the stock"
+        ),
+        FailureKind::EndInWood => format!(
+            "the program ends or stops the spindle with the tip {a:.2} mm below Z {l:.2}; \
+             retract with G0 Z to safe Z before M5"
+        ),
         FailureKind::NoEnd => {
             "does not end with M5 and M2 or M30; it may be cut short, so write it again".to_owned()
         }

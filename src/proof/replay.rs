@@ -4,13 +4,22 @@ use super::failure::{FailureKind, Finding, Ledger};
 use super::{ProgramReport, ProgramText, ProofError};
 use crate::cutter::Profile;
 use crate::gcode::read::{self, EventKind, Program};
-use crate::geom::{DVec3, Grid, Heightfield, Move, MoveKind};
-use crate::job::{CutterSpec, Job};
+use crate::geom::{DVec2, DVec3, Grid, Heightfield, Move, MoveKind};
+use crate::job::{CutterSpec, Job, Operation};
 use crate::motion::Planner;
 use crate::stock::{Block, Contact};
 
-/// Less wood than this removed by a move is a touch, not a cut, mm.
+/// Less wood than this removed by moves with one fault is a touch, not a cut, mm.
 const IN_WOOD_MM: f64 = 0.01;
+
+/// A faultless move longer than this ends a run of faulty ones, mm.
+const RUN_BREAK_MM: f64 = 0.1;
+
+/// How far the tip may stand outside the stock's rectangle, mm.
+const OUTSIDE_MM: f64 = 0.01;
+
+/// Slack of a spindle speed, which the text gives in whole numbers, 1/min.
+const RPM_SLACK: f64 = 0.5;
 
 /// Slack for speeds and lengths that three decimals in the text may add.
 const SPEED_SLACK: f64 = 1.005;
@@ -36,22 +45,80 @@ pub(super) fn replay(
     for text in programs {
         let program = read::read(text.text, &job.machine, start)
             .map_err(|source| ProofError::Read { program: text.name.to_owned(), source })?;
-        let plunge_mm_per_min = job
-            .operations
-            .iter()
-            .filter(|o| o.cutter == *text.cutter)
-            .map(|o| o.plunge_mm_per_min)
-            .reduce(f64::max)
-            .ok_or_else(|| ProofError::NoOperation {
-                program: text.name.to_owned(),
-                cutter: text.cutter.name.clone(),
-            })?;
-        let mut case = Case { text, job, program: &program, plunge_mm_per_min, ledger };
+        let own = operations_of(text, &program, job)?;
+        let most = |of: fn(&Operation) -> f64| own.iter().map(|o| of(o)).fold(0.0, f64::max);
+        let mut case = Case {
+            text,
+            job,
+            program: &program,
+            plunge_mm_per_min: most(|o| o.plunge_mm_per_min),
+            feed_mm_per_min: most(|o| o.feed_mm_per_min),
+            ledger,
+        };
         reports.push(case.run(&mut block));
         read_all.push(program);
     }
     check_travel(programs, &read_all, job, ledger);
     Ok(Replay { programs: read_all, reports, carved: block.into_field() })
+}
+
+/// The operations that a program can be for: those with its cutter and one of its spindle speeds. Where no speed fits
+/// (which is a failure of its own) those with its cutter.
+fn operations_of<'a>(
+    text: &ProgramText,
+    program: &Program,
+    job: &'a Job,
+) -> Result<Vec<&'a Operation>, ProofError> {
+    let of_cutter: Vec<&Operation> =
+        job.operations.iter().filter(|o| o.cutter == *text.cutter).collect();
+    if of_cutter.is_empty() {
+        return Err(ProofError::NoOperation {
+            program: text.name.to_owned(),
+            cutter: text.cutter.name.clone(),
+        });
+    }
+    let spoken = |o: &&Operation| {
+        program.events.iter().any(|e| match e.kind {
+            EventKind::SpindleOn { rpm, .. } => (rpm - o.spindle_rpm).abs() <= RPM_SLACK,
+            _ => false,
+        })
+    };
+    let own: Vec<&Operation> = of_cutter.iter().copied().filter(spoken).collect();
+    Ok(if own.is_empty() { of_cutter } else { own })
+}
+
+/// Wood removed by consecutive moves with one fault: many small bites are a cut, too.
+#[derive(Debug, Default)]
+struct Run {
+    removed_mm: f64,
+}
+
+impl Run {
+    /// Takes in the next move; the amount when the move completes a cut.
+    fn add(&mut self, faulty: bool, m: &Move, c: Contact) -> Option<f64> {
+        let here_mm = f64::from(c.deepest_mm);
+        if !faulty {
+            if m.length_mm() > RUN_BREAK_MM {
+                self.removed_mm = 0.0;
+            }
+            return None;
+        }
+        self.removed_mm += here_mm;
+        if self.removed_mm <= IN_WOOD_MM {
+            return None;
+        }
+        let amount = if here_mm > IN_WOOD_MM { here_mm } else { self.removed_mm };
+        self.removed_mm = 0.0;
+        Some(amount)
+    }
+}
+
+/// One run for each fault that counts in wood only.
+#[derive(Debug, Default)]
+struct Runs {
+    rapid: Run,
+    feed: Run,
+    plunge: Run,
 }
 
 /// One program being checked.
@@ -60,6 +127,7 @@ struct Case<'a> {
     job: &'a Job,
     program: &'a Program,
     plunge_mm_per_min: f64,
+    feed_mm_per_min: f64,
     ledger: &'a mut Ledger,
 }
 
@@ -69,8 +137,10 @@ impl Case<'_> {
         let lowest_mm = moves.iter().map(|m| m.to.z).fold(f64::INFINITY, f64::min);
         self.check_frame();
         let contacts = self.carve(block, lowest_mm);
+        let mut runs = Runs::default();
         for (m, &c) in moves.iter().zip(&contacts) {
-            self.check_move(m, c);
+            self.check_move(m, c, &mut runs);
+            self.check_place(m);
         }
         self.check_spindle(&contacts);
         let times = self.times();
@@ -100,23 +170,42 @@ impl Case<'_> {
         let at = |k: usize| self.program.moves.get(k).map_or(DVec3::ZERO, |m| m.from);
         let end = self.program.moves.last().map_or(DVec3::ZERO, |m| m.to);
         let start = at(0);
+        let safe_z_mm = self.job.safe_z_mm;
         if let Some(line) = self.program.blind_line {
             self.fail(FailureKind::BlindStart, line, start, 0.0, 0.0);
+        } else if let Some((line, z)) = self.program.first_z
+            && z < safe_z_mm - LENGTH_SLACK_MM
+        {
+            let at = start.with_z(z);
+            self.fail(FailureKind::BlindStart, line, at, safe_z_mm - z, 0.0);
+        }
+        if let Some(m) = self.program.moves.last()
+            && end.z < safe_z_mm - LENGTH_SLACK_MM
+        {
+            self.fail(FailureKind::EndInWood, m.line, end, safe_z_mm - end.z, safe_z_mm);
         }
         let (mut running, mut ended) = (false, false);
         for e in &self.program.events {
             match e.kind {
-                EventKind::SpindleOn { rpm } => {
+                EventKind::SpindleOn { rpm, reversed } => {
                     running = true;
-                    let machine = &self.job.machine;
-                    let (low, high) = (machine.spindle_min_rpm, machine.spindle_max_rpm);
-                    if rpm > high || rpm < low {
-                        let limit = if rpm > high { high } else { low };
+                    if reversed {
+                        self.fail(FailureKind::SpindleReversed, e.line, at(e.at_move), rpm, 0.0);
+                    }
+                    if let Some(limit) = self.wanted_rpm(rpm) {
                         self.fail(FailureKind::SpindleSpeed, e.line, at(e.at_move), rpm, limit);
                     }
                 }
-                EventKind::SpindleOff => running = false,
-                EventKind::End => ended = true,
+                EventKind::SpindleOff | EventKind::End => {
+                    running &= e.kind == EventKind::End;
+                    ended |= e.kind == EventKind::End;
+                    let tip = e.at_move.checked_sub(1).and_then(|k| self.program.moves.get(k));
+                    if let Some(m) = tip
+                        && m.to.z < -LENGTH_SLACK_MM
+                    {
+                        self.fail(FailureKind::EndInWood, e.line, m.to, -m.to.z, 0.0);
+                    }
+                }
                 EventKind::Dwell { .. } => {}
             }
         }
@@ -125,9 +214,24 @@ impl Case<'_> {
         }
     }
 
+    /// The speed that should be there instead; `None` when this one is right.
+    fn wanted_rpm(&self, rpm: f64) -> Option<f64> {
+        let machine = &self.job.machine;
+        let (low, high) = (machine.spindle_min_rpm, machine.spindle_max_rpm);
+        if rpm > high || rpm < low {
+            return Some(if rpm > high { high } else { low });
+        }
+        let off = |wanted: f64| (wanted - rpm).abs();
+        let operations = self.job.operations.iter().filter(|o| o.cutter == *self.text.cutter);
+        operations
+            .map(|o| o.spindle_rpm)
+            .min_by(|a, b| off(*a).total_cmp(&off(*b)))
+            .filter(|&nearest| off(nearest) > RPM_SLACK)
+    }
+
     /// Removes the program's moves from the block.
     ///
-    /// Moves whose own contact matters are carved alone: those that go down too fast, those beside an event and,
+    /// Moves whose own contact matters are carved alone: those that go down or along too fast, those beside an event and,
     /// where the wood is deeper than the flutes are long, all of them.
     fn carve(&mut self, block: &mut Block, lowest_mm: f64) -> Vec<Contact> {
         let moves = &self.program.moves;
@@ -141,7 +245,7 @@ impl Case<'_> {
         }
         let every = depth_mm > cutter.flute_mm;
         let mut alone: Vec<bool> =
-            moves.iter().map(|m| every || self.down_mm_per_min(m) > self.plunge_limit()).collect();
+            moves.iter().map(|m| every || self.plunges(m) || self.races(m)).collect();
         for e in &self.program.events {
             for k in [e.at_move.wrapping_sub(1), e.at_move] {
                 if let Some(flag) = alone.get_mut(k) {
@@ -191,8 +295,15 @@ impl Case<'_> {
         contacts
     }
 
-    fn plunge_limit(&self) -> f64 {
-        self.plunge_mm_per_min * SPEED_SLACK
+    /// True when the move goes down faster than it may in wood.
+    fn plunges(&self, m: &Move) -> bool {
+        self.down_mm_per_min(m) > self.plunge_mm_per_min * SPEED_SLACK
+    }
+
+    /// True when the move's feed is higher than it may be in wood.
+    fn races(&self, m: &Move) -> bool {
+        let MoveKind::Feed { feed_mm_per_min } = m.kind else { return false };
+        feed_mm_per_min > self.feed_mm_per_min * SPEED_SLACK
     }
 
     /// Downward speed of a feed move, as fast as the machine's Z allows; 0 for others.
@@ -203,22 +314,24 @@ impl Case<'_> {
     }
 
     /// Feed, rapid, plunge, flute, bottom.
-    fn check_move(&mut self, m: &Move, c: Contact) {
-        let deepest_mm = f64::from(c.deepest_mm);
+    fn check_move(&mut self, m: &Move, c: Contact, runs: &mut Runs) {
+        if let Some(removed_mm) = runs.rapid.add(m.is_rapid(), m, c) {
+            self.fail(FailureKind::RapidInWood, m.line, m.to, removed_mm, IN_WOOD_MM);
+        }
+        let raced = runs.feed.add(self.races(m), m, c).is_some();
+        if runs.plunge.add(self.plunges(m), m, c).is_some() {
+            let down = self.down_mm_per_min(m);
+            self.fail(FailureKind::Plunge, m.line, m.to, down, self.plunge_mm_per_min);
+        }
         match m.kind {
-            MoveKind::Rapid => {
-                if deepest_mm > IN_WOOD_MM {
-                    self.fail(FailureKind::RapidInWood, m.line, m.to, deepest_mm, IN_WOOD_MM);
-                }
-            }
+            MoveKind::Rapid => {}
             MoveKind::Feed { feed_mm_per_min } => {
                 let limit = fastest_axis(m, self.job.machine.max_rate_mm_per_min);
                 if !(feed_mm_per_min > 0.0 && feed_mm_per_min <= limit) {
                     self.fail(FailureKind::Feed, m.line, m.to, feed_mm_per_min, limit);
-                }
-                let down = self.down_mm_per_min(m);
-                if deepest_mm > IN_WOOD_MM && down > self.plunge_limit() {
-                    self.fail(FailureKind::Plunge, m.line, m.to, down, self.plunge_mm_per_min);
+                } else if raced {
+                    let limit = self.feed_mm_per_min;
+                    self.fail(FailureKind::Feed, m.line, m.to, feed_mm_per_min, limit);
                 }
             }
         }
@@ -232,10 +345,36 @@ impl Case<'_> {
         }
     }
 
+    /// No way sideways in a rapid below safe Z, none below the stock's top beside it.
+    fn check_place(&mut self, m: &Move) {
+        let safe_z_mm = self.job.safe_z_mm;
+        let low = if m.from.z < m.to.z { m.from } else { m.to };
+        if m.is_rapid()
+            && m.from.truncate() != m.to.truncate()
+            && low.z < safe_z_mm - LENGTH_SLACK_MM
+        {
+            self.fail(FailureKind::LowRapid, m.line, low, safe_z_mm - low.z, safe_z_mm);
+        }
+        if low.z >= -LENGTH_SLACK_MM {
+            return;
+        }
+        // The distance from a rectangle is convex, so the ends of the part below the top are the farthest.
+        let high = m.from + m.to - low;
+        let share = if high.z > 0.0 { low.z / (low.z - high.z) } else { 1.0 };
+        let stock = self.job.stock.bounds();
+        for p in [low, low + (high - low) * share] {
+            let out = (stock.min - p.truncate()).max(p.truncate() - stock.max).max(DVec2::ZERO);
+            if out.length() > OUTSIDE_MM {
+                self.fail(FailureKind::OutsideStock, m.line, p, out.length(), OUTSIDE_MM);
+            }
+        }
+    }
+
     /// The spindle must turn, and have had its time to start, wherever the tip is in wood.
     fn check_spindle(&mut self, contacts: &[Contact]) {
         let need_s = self.job.machine.spindle_dwell_s;
         let (mut running, mut waited_s) = (false, 0.0);
+        let (mut still, mut early) = (Run::default(), Run::default());
         let mut events = self.program.events.iter().peekable();
         for (k, (m, c)) in self.program.moves.iter().zip(contacts).enumerate() {
             while let Some(e) = events.next_if(|e| e.at_move <= k) {
@@ -246,13 +385,11 @@ impl Case<'_> {
                     EventKind::Dwell { seconds } => waited_s += seconds,
                 }
             }
-            let deepest_mm = f64::from(c.deepest_mm);
-            if deepest_mm <= IN_WOOD_MM {
-                continue;
+            if let Some(removed_mm) = still.add(!running, m, *c) {
+                self.fail(FailureKind::SpindleOff, m.line, m.to, removed_mm, IN_WOOD_MM);
             }
-            if !running {
-                self.fail(FailureKind::SpindleOff, m.line, m.to, deepest_mm, IN_WOOD_MM);
-            } else if waited_s < need_s - 1e-3 {
+            let short = running && waited_s < need_s - 1e-3;
+            if early.add(short, m, *c).is_some() {
                 self.fail(FailureKind::NoDwell, m.line, m.to, need_s - waited_s, need_s);
             }
         }

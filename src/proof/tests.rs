@@ -244,6 +244,135 @@ fn frames_of_programs_are_checked() {
 }
 
 #[test]
+fn a_program_that_ends_in_wood_is_caught() {
+    let f = assert_caught(&flat_job(), &broken(14, None), FailureKind::EndInWood, 13);
+    assert_eq!((f.amount, f.limit), (7.0, 5.0));
+    assert!(f.sentence.contains("line 13") && f.sentence.contains("retract"), "{f}");
+    // Above the wood is not yet safe.
+    assert_caught(&flat_job(), &broken(14, Some("G0 Z4")), FailureKind::EndInWood, 14);
+    // Retracting after M5 is too late.
+    let mut late = CLEAN.to_vec();
+    late.swap(13, 14);
+    assert_caught(&flat_job(), &late, FailureKind::EndInWood, 14);
+}
+
+#[test]
+fn feed_and_speed_are_held_to_the_cutters_own_operations() {
+    let f = assert_caught(&flat_job(), &broken(8, Some("G1 X35 F1800")), FailureKind::Feed, 8);
+    assert_eq!((f.amount, f.limit), (1800.0, 1500.0));
+    let f = assert_caught(&flat_job(), &broken(3, Some("M3 S12000")), FailureKind::SpindleSpeed, 3);
+    assert_eq!((f.amount, f.limit), (12000.0, 18000.0));
+    // An operation with another cutter or at another speed lends neither its feed nor its plunge.
+    let fast = |cutter: CutterSpec, spindle_rpm: f64| {
+        let mut job = flat_job();
+        let more = Operation {
+            cutter,
+            spindle_rpm,
+            feed_mm_per_min: 4000.0,
+            plunge_mm_per_min: 1500.0,
+            ..job.operations[0].clone()
+        };
+        job.operations.push(more);
+        job
+    };
+    let own = flat_job().operations[0].cutter.clone();
+    let others = [fast(cutter(CutterShape::Ball, 3.0), 18000.0), fast(own.clone(), 12000.0)];
+    for job in others {
+        assert_caught(&job, &broken(8, Some("G1 X35 F1800")), FailureKind::Feed, 8);
+        assert_caught(&job, &broken(7, Some("G1 Z-2 F1000")), FailureKind::Plunge, 7);
+        assert!(verdict(&job, &CLEAN).unwrap().passed());
+    }
+    let v = verdict(&fast(own, 18000.0), &broken(8, Some("G1 X35 F1800"))).unwrap();
+    assert!(v.passed(), "{:#?}", v.failures);
+    // Through air any feed that the machine has is right.
+    let mut air = CLEAN.to_vec();
+    air.insert(5, "G1 Z1 F2000");
+    let v = verdict(&flat_job(), &air).unwrap();
+    assert!(v.passed(), "{:#?}", v.failures);
+}
+
+#[test]
+fn a_reversed_spindle_is_caught() {
+    let f =
+        assert_caught(&flat_job(), &broken(3, Some("M4 S18000")), FailureKind::SpindleReversed, 3);
+    assert!(f.sentence.contains("M3"), "{f}");
+}
+
+#[test]
+fn a_first_height_below_safe_z_is_caught() {
+    assert_caught(&flat_job(), &broken(2, Some("G0 Z-1")), FailureKind::BlindStart, 2);
+    assert_caught(&flat_job(), &broken(2, Some("G0 Z4.9")), FailureKind::BlindStart, 2);
+}
+
+#[test]
+fn a_low_rapid_sideways_is_caught() {
+    let f = assert_caught(&flat_job(), &broken(9, Some("G0 Z1")), FailureKind::LowRapid, 10);
+    assert_eq!((f.amount, f.limit), (4.0, 5.0));
+    let v = verdict(&flat_job(), &broken(9, Some("G0 Z1"))).unwrap();
+    assert_eq!(v.failures.len(), 1, "{:#?}", v.failures);
+}
+
+#[test]
+fn a_feed_beside_the_stock_is_caught() {
+    let f =
+        assert_caught(&flat_job(), &broken(8, Some("G1 X45 F1500")), FailureKind::OutsideStock, 8);
+    assert_eq!(f.amount, 5.0);
+    // It comes above the top before it comes to the edge.
+    let rising = broken(8, Some("G1 X45 Z2 F1500"));
+    assert!(
+        !verdict(&flat_job(), &rising)
+            .unwrap()
+            .failures
+            .iter()
+            .any(|f| f.kind == FailureKind::OutsideStock)
+    );
+    let late = broken(8, Some("G1 X45 Z0.1 F1500"));
+    assert_caught(&flat_job(), &late, FailureKind::OutsideStock, 8);
+}
+
+#[test]
+fn faults_chopped_into_small_bites_are_caught() {
+    // From the top down to -2 in bites of 0.008.
+    let chop = |feed: &str| -> Vec<String> {
+        (1..=250_i32).map(|k| format!("G1 Z{:.3} {feed}", -0.008 * f64::from(k))).collect()
+    };
+    let with = |at: usize, bites: &[String], skip: &[usize]| -> Vec<String> {
+        let mut lines: Vec<String> = CLEAN.iter().map(ToString::to_string).collect();
+        lines.splice(at - 1..at, bites.iter().cloned());
+        for &k in skip {
+            lines.remove(k - 1);
+        }
+        lines
+    };
+    let check = |lines: &[String], kind: FailureKind, line: u32| {
+        let lines: Vec<&str> = lines.iter().map(String::as_str).collect();
+        let v = verdict(&flat_job(), &lines).unwrap();
+        let found = v.failures.iter().find(|f| f.kind == kind);
+        let found = found.unwrap_or_else(|| panic!("{kind:?} not in {:#?}", v.failures));
+        assert!(found.line.abs_diff(line) <= 250, "{found}");
+    };
+    let fast = chop("F1200");
+    check(&with(7, &fast, &[]), FailureKind::Plunge, 8);
+    // With moves sideways of next to nothing between.
+    let mixed: Vec<String> = fast
+        .iter()
+        .enumerate()
+        .flat_map(|(k, z)| {
+            [z.clone(), format!("G1 X{} F1200", if k % 2 == 0 { 5.01 } else { 5.0 })]
+        })
+        .collect();
+    check(&with(7, &mixed, &[]), FailureKind::Plunge, 8);
+    let slow = chop("F300");
+    check(&with(7, &slow, &[3]), FailureKind::SpindleOff, 7);
+    check(&with(7, &slow, &[4]), FailureKind::NoDwell, 7);
+    let rapid: Vec<String> = chop("").iter().map(|l| l.replace("G1", "G0")).collect();
+    check(&with(7, &rapid, &[]), FailureKind::RapidInWood, 8);
+    let v = with(7, &slow, &[]);
+    let v = verdict(&flat_job(), &v.iter().map(String::as_str).collect::<Vec<_>>()).unwrap();
+    assert!(v.passed(), "{:#?}", v.failures);
+}
+
+#[test]
 fn an_unknown_word_stops_the_proof() {
     let e = verdict(&flat_job(), &broken(8, Some("G1 X35 F1500 M8"))).unwrap_err();
     let ProofError::Read { program, source } = &e else { panic!("{e}") };
@@ -298,11 +427,10 @@ fn what_no_cutter_reaches_is_counted_apart() {
 #[test]
 fn a_raster_on_a_plane_leaves_the_analytic_cusp() {
     let job = job(cutter(CutterShape::Ball, 3.0));
-    let mut text =
-        String::from("G21 G90\nG0 Z5\nM3 S18000\nG4 P2\nG0 X-2 Y-2\nG1 Z-2 F300\nF1500\n");
-    for k in 0..60_i32 {
-        let y = f64::from(k) * 0.4 - 2.0;
-        let (a, b) = if k % 2 == 0 { (-2, 42) } else { (42, -2) };
+    let mut text = String::from("G21 G90\nG0 Z5\nM3 S18000\nG4 P2\nG0 X0 Y0\nG1 Z-2 F300\nF1500\n");
+    for k in 0..51_i32 {
+        let y = f64::from(k) * 0.4;
+        let (a, b) = if k % 2 == 0 { (0, 40) } else { (40, 0) };
         writeln!(text, "G1 X{a} Y{y:.3}\nX{b}").unwrap();
     }
     text += "G0 Z5\nM5\nM30\n";

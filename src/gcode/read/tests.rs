@@ -48,7 +48,7 @@ fn a_small_program_becomes_moves_and_events() {
     assert_eq!(
         events,
         [
-            (0, 3, EventKind::SpindleOn { rpm: 18000.0 }),
+            (0, 3, EventKind::SpindleOn { rpm: 18000.0, reversed: false }),
             (0, 4, EventKind::Dwell { seconds: 2.5 }),
             (4, 11, EventKind::SpindleOff),
             (4, 12, EventKind::End),

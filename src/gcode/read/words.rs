@@ -28,6 +28,14 @@ pub(super) enum Distance {
     Incremental,
 }
 
+/// How the spindle shall turn.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Spindle {
+    Forward,
+    Reversed,
+    Off,
+}
+
 /// The words of one line.
 #[derive(Debug, Default)]
 pub(super) struct Line {
@@ -35,7 +43,7 @@ pub(super) struct Line {
     pub(super) plane: Option<Plane>,
     pub(super) distance: Option<Distance>,
     pub(super) inches: Option<bool>,
-    pub(super) spindle: Option<bool>,
+    pub(super) spindle: Option<Spindle>,
     pub(super) dwell: bool,
     pub(super) end: bool,
     feed_mode: Option<()>,
@@ -144,8 +152,9 @@ impl Line {
     fn add_m(&mut self, value: f64) -> Result<(), fn(String) -> Fault> {
         match code(value) {
             Some(2 | 30) => flag(&mut self.end),
-            Some(3 | 4) => once(&mut self.spindle, true),
-            Some(5) => once(&mut self.spindle, false),
+            Some(3) => once(&mut self.spindle, Spindle::Forward),
+            Some(4) => once(&mut self.spindle, Spindle::Reversed),
+            Some(5) => once(&mut self.spindle, Spindle::Off),
             _ => Err(Fault::UnknownWord),
         }
     }
