@@ -224,17 +224,33 @@ fn checks(carving: &Carving) -> Vec<Check> {
     let limit = job.tolerance.scallop_mm + job.tolerance.gouge_mm;
     let mut rows = vec![
         (format!("no gouge deeper than {} mm", job.tolerance.gouge_mm), vec![K::Gouge], deepest),
-        ("no rapid in wood".into(), vec![K::RapidInWood, K::BlindStart], "none".into()),
+        (
+            "no rapid in wood".into(),
+            vec![K::RapidInWood, K::LowRapid, K::BlindStart],
+            "none".into(),
+        ),
         ("no plunge in wood faster than its limit".into(), vec![K::Plunge], "none".into()),
         (
             "flutes, shank and collet clear of wood".into(),
             vec![K::Flute, K::Shank, K::Holder],
             format!("deepest cut {flute:.2} mm"),
         ),
-        ("inside the machine's travel".into(), vec![K::Travel, K::ThroughBottom], "inside".into()),
+        (
+            "inside the machine's travel and the stock".into(),
+            vec![K::Travel, K::OutsideStock, K::ThroughBottom],
+            "inside".into(),
+        ),
         (
             "feeds and spindle within limits".into(),
-            vec![K::Feed, K::SpindleSpeed, K::SpindleOff, K::NoDwell, K::NoEnd],
+            vec![
+                K::Feed,
+                K::SpindleSpeed,
+                K::SpindleReversed,
+                K::SpindleOff,
+                K::NoDwell,
+                K::EndInWood,
+                K::NoEnd,
+            ],
             "within".into(),
         ),
         ("second oracle agrees".into(), vec![K::Oracles], "agrees".into()),

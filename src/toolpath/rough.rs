@@ -30,6 +30,8 @@ pub(super) struct Rough {
 
 /// A row with what is known along it, at the same places.
 struct Survey {
+    /// Number of the row; deep stretches of one row share it.
+    number: usize,
     row: Row,
     /// Lowest height that the allowance leaves to the tip.
     allowed: Vec<Sample>,
@@ -59,9 +61,23 @@ pub(super) fn rough(
     );
     let bounds = site.job.stock.bounds();
     site.refuse_endless(cut.angle_rad, cut.stepover_mm, tracer.spacing_mm())?;
-    let surveys: Vec<Survey> = rows(&bounds, cut.angle_rad, cut.stepover_mm)
+    let all = rows(&bounds, cut.angle_rad, cut.stepover_mm);
+    let count = all.len();
+    let stretches: Vec<(usize, Row)> = all
         .into_par_iter()
-        .map(|row| {
+        .enumerate()
+        .flat_map_iter(|(number, row)| {
+            let parts = if cut.only_deeper_than_mm > 0.0 {
+                deep_stretches(site, cut, block, &row)
+            } else {
+                vec![row]
+            };
+            parts.into_iter().map(move |part| (number, part))
+        })
+        .collect();
+    let surveys: Vec<Survey> = stretches
+        .into_par_iter()
+        .map(|(number, row)| {
             let allowed = tracer.even(row.from, row.to);
             let wood = |s: &Sample| block.highest_under(profile.radius_mm(), point(&row, s.s));
             let wood_mm = if site.fresh {
@@ -79,7 +95,7 @@ pub(super) fn rough(
             } else {
                 vec![true; allowed.len()]
             };
-            Survey { row, allowed, wood_mm, wanted }
+            Survey { number, row, allowed, wood_mm, wanted }
         })
         .collect();
     let lowest = surveys.iter().flat_map(|s| &s.allowed).map(|p| p.z).fold(f64::INFINITY, f64::min);
@@ -89,8 +105,10 @@ pub(super) fn rough(
     let levels = (-lowest / cut.stepdown_mm - 1e-9).ceil().max(1.0) as usize;
     for k in 1..=levels {
         let z = lowest * (k as f64 / levels as f64);
-        let spans =
-            surveys.iter().map(|s| spans(s, z, cut, site.operation.cutter.diameter_mm)).collect();
+        let mut by_row: Vec<Vec<Span>> = vec![Vec::new(); count];
+        for s in &surveys {
+            by_row[s.number].extend(spans(s, z, cut, site.operation.cutter.diameter_mm));
+        }
         let link = |a: DVec3, b: DVec3| {
             let direct = [a, b];
             if feed_seconds(site.operation, &direct) > lift_seconds(site.job, site.operation, a, b)
@@ -101,7 +119,7 @@ pub(super) fn rough(
             way.iter().all(|p| is_allowed(p, z)).then(Vec::new)
         };
         let before = out.moves().len();
-        for chain in chains(spans, link) {
+        for chain in chains(by_row, link) {
             let wood = block.highest_under(profile.radius_mm(), chain[0].truncate());
             out.chain(&chain, wood);
         }
@@ -110,6 +128,28 @@ pub(super) fn rough(
         }
     }
     Ok(())
+}
+
+/// The stretches of a row that may hold places deep enough to be worked on, with a diameter of room at both ends.
+/// The tip never goes below the target on its axis, so all other places can be left out unseen.
+fn deep_stretches(site: &Site, cut: &Rough, block: &Block, row: &Row) -> Vec<Row> {
+    let (length, room) = (row.from.distance(row.to), site.operation.cutter.diameter_mm);
+    let n = (length / site.target.grid().pitch_mm).ceil().max(1.0) as usize;
+    let mut stretches: Vec<(f64, f64)> = Vec::new();
+    for k in 0..=n {
+        let s = length * (k as f64 / n as f64);
+        let p = point(row, s);
+        let (top, floor) = (block.field().height_at(p), site.target.height_at(p));
+        if let (Some(top), Some(floor)) = (top, floor)
+            && top - floor > cut.only_deeper_than_mm
+        {
+            match stretches.last_mut() {
+                Some((_, to)) if s - room <= *to => *to = (s + room).min(length),
+                _ => stretches.push(((s - room).max(0.0), (s + room).min(length))),
+            }
+        }
+    }
+    stretches.into_iter().map(|(a, b)| Row { from: point(row, a), to: point(row, b) }).collect()
 }
 
 fn point(row: &Row, s: f64) -> DVec2 {
