@@ -12,6 +12,7 @@ mod distance;
 mod failure;
 mod oracle;
 mod replay;
+mod walls;
 
 pub use deviation::{Gouge, Leftover, Quantiles};
 pub use failure::{Failure, FailureKind};

@@ -75,3 +75,23 @@ fn cloud_carves() {
 fn tiger_carves() {
     carve(&samples().into_iter().find(|s| name(s) == "tiger").unwrap());
 }
+
+#[test]
+fn artwork_too_large_for_the_machine_is_refused_with_the_cure() {
+    // 2000 pt wide: more than half a metre at its own size.
+    let tiger = samples().into_iter().find(|s| name(s) == "tiger").unwrap().join("tiger.svg");
+    let desk = tempfile::tempdir().unwrap();
+    std::fs::copy(tiger, desk.path().join("tiger.svg")).unwrap();
+    let out = assert_cmd::Command::cargo_bin("relievo")
+        .unwrap()
+        .current_dir(desk.path())
+        .args(["carve", "tiger.svg"])
+        .output()
+        .unwrap();
+    let said = String::from_utf8_lossy(&out.stderr);
+    assert_eq!(out.status.code(), Some(1), "{said}");
+    for word in ["425 mm", "629", "artwork.width_mm", "relievo new tiger.svg"] {
+        assert!(said.contains(word), "'{word}' in {said}");
+    }
+    assert_eq!(std::fs::read_dir(desk.path()).unwrap().count(), 1, "nothing was written");
+}

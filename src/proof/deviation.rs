@@ -4,6 +4,7 @@ use super::ProgramText;
 use super::distance::Terrain;
 use super::failure::{FailureKind, Finding, Ledger};
 use super::oracle::{self, SplitMix64, Track};
+use super::walls::Walls;
 use crate::cutter::Profile;
 use crate::geom::{DVec2, DVec3, Grid, Heightfield};
 use crate::job::Job;
@@ -229,7 +230,8 @@ pub(super) fn judge_gouge(
         deepest = Spot::worse(deepest, spot);
         too_deep = too_deep.join(tally);
     }
-    let spot = deepest?;
+    let overcut = judge_walls(tracks, programs, job, target, ledger);
+    let Some(spot) = deepest else { return overcut };
     let by = oracle::lowest(tracks, &[spot.at.truncate()])[0].by;
     let (program, line) = by.map_or(("", 0), |(t, k)| (programs[t].name, tracks[t].moves[k].line));
     if too_deep.count > 0 {
@@ -238,7 +240,31 @@ pub(super) fn judge_gouge(
         let kind = FailureKind::Gouge;
         ledger.note(Finding { kind, program, line, at: spot.at, amount, limit }, too_deep.count);
     }
-    Some(Gouge { depth_mm: spot.amount, at: spot.at, program: program.to_owned(), line })
+    let gouge = Gouge { depth_mm: spot.amount, at: spot.at, program: program.to_owned(), line };
+    overcut.filter(|o| o.depth_mm > gouge.depth_mm).or(Some(gouge))
+}
+
+/// Finds the deepest cut into a wall, which may not show at any node; each is a failure.
+fn judge_walls(
+    tracks: &[Track],
+    programs: &[ProgramText],
+    job: &Job,
+    target: &Heightfield,
+    ledger: &mut Ledger,
+) -> Option<Gouge> {
+    let walls = Walls::new(target);
+    let limit = job.tolerance.gouge_mm;
+    let mut deepest: Option<Gouge> = None;
+    for (track, program) in tracks.iter().zip(programs) {
+        let Some(found) = walls.overcut(track, limit) else { continue };
+        let (kind, program, line) = (FailureKind::Gouge, program.name, track.moves[found.by].line);
+        let (at, amount) = (found.at, found.depth_mm);
+        ledger.note(Finding { kind, program, line, at, amount, limit }, found.count);
+        if deepest.as_ref().is_none_or(|d| amount > d.depth_mm) {
+            deepest = Some(Gouge { depth_mm: amount, at, program: program.to_owned(), line });
+        }
+    }
+    deepest
 }
 
 /// Penetration at the points that lie `shift` pitches beside the nodes.

@@ -25,7 +25,7 @@ fn machine() -> Machine {
     }
 }
 
-fn cutter(shape: CutterShape, diameter_mm: f64) -> CutterSpec {
+pub(super) fn cutter(shape: CutterShape, diameter_mm: f64) -> CutterSpec {
     CutterSpec {
         name: "test".into(),
         shape,
@@ -38,7 +38,7 @@ fn cutter(shape: CutterShape, diameter_mm: f64) -> CutterSpec {
     }
 }
 
-fn job(cutter: CutterSpec) -> Job {
+pub(super) fn job(cutter: CutterSpec) -> Job {
     Job {
         title: "test".into(),
         machine: machine(),

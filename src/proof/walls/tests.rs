@@ -1,0 +1,72 @@
+use super::*;
+use crate::geom::Grid;
+use crate::proof::tests::{cutter, job};
+use crate::proof::{FailureKind, ProgramText, Verdict, prove};
+use proptest::prelude::*;
+
+/// Ground at -2 with a wall to the top that rises within the cell from x = 20 to 20.1.
+fn wall() -> Heightfield {
+    let grid = Grid::covering(DVec2::ZERO, 40.0, 20.0, 0.1).unwrap();
+    Heightfield::from_fn(grid, |p| if p.x > 20.05 { 0.0 } else { -2.0 })
+}
+
+/// A pass far from the wall, then one along it (line 11) with the axis at `x` and the tip at `z`.
+fn along(shape: CutterShape, x: f64, z: f64) -> Verdict {
+    let text = format!(
+        "G21 G90\nG0 Z5\nM3 S18000\nG4 P2\nG0 X10 Y5\nG1 Z{z:.3} F300\nG1 Y15 F1500\nG0 Z5\n\
+         G0 X{x:.3} Y5\nG1 Z{z:.3} F300\nG1 Y15 F1500\nG0 Z5\nM5\nM30\n"
+    );
+    let job = job(cutter(shape, 3.0));
+    let programs =
+        [ProgramText { name: "1-test.nc", text: &text, cutter: &job.operations[0].cutter }];
+    let target = wall();
+    prove(&programs, &job, &target, &target).unwrap()
+}
+
+#[test]
+fn a_wall_overcut_by_a_fiftieth_is_caught_at_any_place_in_the_cell() {
+    for k in 0..8_i32 {
+        let z = -2.0 + 0.2 * f64::from(k);
+        // Flat: the wall stands at 20 + (z + 2) / 20 at the tip's height.
+        let flat = 20.0 + (z + 2.0) / 20.0 - 1.5;
+        // Ball: the wall's plane 20 (x - 20) = z + 2 lies its radius from the centre.
+        let ball = 20.0 + ((z + 1.5 + 2.0) - 1.5 * 401.0_f64.sqrt()) / 20.0;
+        for (shape, x) in [(CutterShape::Flat, flat), (CutterShape::Ball, ball)] {
+            // The wall's top edge, not its plane, is what a high ball meets.
+            if shape == CutterShape::Ball && z + 1.5 > -0.1 {
+                continue;
+            }
+            let v = along(shape, x + 0.02, z);
+            let f = v.failures.iter().find(|f| f.kind == FailureKind::Gouge);
+            let f = f.unwrap_or_else(|| panic!("{shape:?} at {z} passes"));
+            assert!([10, 11].contains(&f.line), "{f}");
+            assert!((f.amount - 0.02).abs() < 2e-3, "{shape:?} {z}: {f}");
+            assert_eq!(v.gouge.unwrap().depth_mm, f.amount);
+            let v = along(shape, x + 0.008, z);
+            assert!(v.passed(), "{shape:?} {z}: {:#?}", v.failures);
+        }
+    }
+}
+
+proptest! {
+    #[test]
+    fn segment_and_triangle_are_as_far_apart_as_their_samples(
+        c in prop::array::uniform15(-3.0f64..3.0),
+    ) {
+        let p = |k: usize| DVec3::new(c[3 * k], c[3 * k + 1], c[3 * k + 2]);
+        let (a, b, t) = (p(0), p(1), [p(2), p(3), p(4)]);
+        let d = segment_to_triangle(a, b, t, f64::INFINITY);
+        let mut want = f64::INFINITY;
+        let n = 40;
+        for i in 0..=n {
+            for j in 0..=n - i {
+                let (u, v) = (f64::from(i) / f64::from(n), f64::from(j) / f64::from(n));
+                let q = t[0] + (t[1] - t[0]) * u + (t[2] - t[0]) * v;
+                let l2 = (b - a).length_squared();
+                let s = ((q - a).dot(b - a) / l2).clamp(0.0, 1.0);
+                want = want.min(q.distance(a + (b - a) * s));
+            }
+        }
+        prop_assert!(d <= want + 1e-9 && d >= want - 0.3, "{d} {want}");
+    }
+}
