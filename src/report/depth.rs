@@ -42,8 +42,8 @@ pub fn depth_png(field: &Heightfield) -> Result<Vec<u8>, ReportError> {
         ("z_black_mm", f64::from(low).to_string()),
         ("z_white_mm", f64::from(high).to_string()),
         ("pitch_mm", grid.pitch_mm.to_string()),
-        ("origin_x_mm", grid.origin.x.to_string()),
-        ("origin_y_mm", grid.origin.y.to_string()),
+        ("origin_x_mm", (grid.origin.x + 0.0).to_string()),
+        ("origin_y_mm", (grid.origin.y + 0.0).to_string()),
     ];
     encode(w, h, png::ColorType::Grayscale, &samples, Some(1.0 / grid.pitch_mm), &notes)
 }

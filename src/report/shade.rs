@@ -45,8 +45,8 @@ impl Look {
 }
 
 /// A relief this shallow, as a fraction of its longer side, is lit as if it were this deep, so that
-/// its form can still be read; by a factor of 3 at most.
-const LEAST_DEPTH: f64 = 0.06;
+/// its form can still be read; by a factor of 1.8 at most.
+const LEAST_DEPTH: f64 = 0.05;
 
 /// The hill-shaded relief as an RGB PNG: one soft sun from the upper left, a sky that leaves hollows
 /// and the foot of walls dark, and soft cast shadows (horizon sweeps over 45 lights, in the manner of
@@ -105,7 +105,7 @@ pub fn shaded_png(
 fn exaggeration(plane: &Plane, low: f32, high: f32) -> f64 {
     let depth = f64::from(high) - f64::from(low);
     let side = plane.w.max(plane.h) as f64 * plane.mm_per_px;
-    if depth > 0.0 { (LEAST_DEPTH * side / depth).clamp(1.0, 3.0) } else { 1.0 }
+    if depth > 0.0 { (LEAST_DEPTH * side / depth).clamp(1.0, 1.8) } else { 1.0 }
 }
 
 /// The light on a field and its plane, for pictures that lay colours over a faint relief.
