@@ -44,6 +44,7 @@ pub mod report;
 pub mod cli;
 
 use artwork::{Artwork, ArtworkError};
+use geom::{DVec3, Move, MoveKind};
 use job::{Draft, Job, JobError};
 use outline::{OutlineError, Outlines};
 use proof::{ProgramText, ProofError, Verdict};
@@ -172,7 +173,12 @@ pub fn design(
 
 /// The program of a toolpath, its header filled in.
 fn emit(job: &Job, number: usize, path: &Toolpath) -> Program {
-    let seconds = motion::seconds(&path.moves, &job.machine) + job.machine.spindle_dwell_s;
+    // As the proof replays it: from above the zero, after the spindle has started.
+    let start = DVec3::new(0.0, 0.0, job.safe_z_mm);
+    let first = path.moves.first().map_or(start, |m| m.from);
+    let approach = Move { from: start, to: first, kind: MoveKind::Rapid, line: 0 };
+    let moves: Vec<Move> = std::iter::once(approach).chain(path.moves.iter().copied()).collect();
+    let seconds = motion::seconds(&moves, &job.machine) + job.machine.spindle_dwell_s;
     let file = gcode::write::file_stem(number, path);
     let header = gcode::write::header(job, number, path, seconds);
     Program { name: format!("{file}.nc"), text: gcode::write::write(path, &header, job) }

@@ -147,6 +147,23 @@ fn programs_are_grbl_clean() {
 }
 
 #[test]
+fn the_header_tells_the_time_that_the_proof_found() {
+    let desk = leaf_desk();
+    let out = desk.run(&["carve", "leaf.toml", "--json"]);
+    let json: serde_json::Value = serde_json::from_slice(&out.stdout).unwrap();
+    for report in json["reports"].as_array().unwrap() {
+        let name = report["name"].as_str().unwrap();
+        let text =
+            String::from_utf8(desk.files()[&format!("leaf-carving/{name}")].clone()).unwrap();
+        let line = text.lines().find(|l| l.starts_with("(time ")).unwrap();
+        let words: Vec<&str> = line.split_whitespace().collect();
+        let told: f64 = words[1].parse::<f64>().unwrap() * 60.0 + words[3].parse::<f64>().unwrap();
+        let found = report["seconds"].as_f64().unwrap();
+        assert!((told - found).abs() < 0.6, "{name}: {told} told, {found} found");
+    }
+}
+
+#[test]
 fn the_same_bytes_with_one_and_two_threads() {
     let one = leaf_desk();
     let two = leaf_desk();
