@@ -261,7 +261,7 @@ fn every_way_to_write_a_use_is_seen() {
     assert_eq!(bad(&["a"], "use crate::b::X;"), 1);
     assert_eq!(bad(&["a"], "use crate::{b::{X, Y}, c};"), 3);
     assert_eq!(bad(&["a"], "pub use super::b::*;"), 1);
-    assert_eq!(bad(&["a", "deep"], "fn f() -> super::super::b::X { todo!() }"), 1);
+    assert_eq!(bad(&["a", "deep"], "fn f(x: super::super::b::X) {}"), 1);
     assert_eq!(bad(&["a"], "fn f() { let x = vec![crate::b::X::new(1)]; }"), 1);
     assert_eq!(bad(&["a"], "mod m { use super::super::b; }"), 1);
     assert_eq!(bad(&["a"], "#[cfg(test)] mod tests { use crate::b; }"), 0);

@@ -1,0 +1,324 @@
+//! What is wrong with a job file: kind, line, column and cure of each fault.
+
+use super::*;
+
+#[test]
+fn unknown_keys_name_the_nearest() {
+    let kind = |e: &JobError| matches!(e, JobError::UnknownKey(_));
+    refused(
+        &with("[relief]\ndeph_mm = 8\n"),
+        kind,
+        (4, 1),
+        &["deph_mm", "did you mean `depth_mm`?"],
+    );
+    refused(
+        &with("[[operation]]\nkind = \"rough\"\n  stepdwon_mm = 1\n"),
+        kind,
+        (5, 3),
+        &["`stepdown_mm`"],
+    );
+    refused(&with("[stok]\nwidth_mm = 8\n"), kind, (3, 2), &["did you mean `stock`?"]);
+    refused(
+        &with("[[layer]]\nselect = \"all\"\n[[layer]]\nselect = \"all\"\nheigth_mm = 1\n"),
+        kind,
+        (7, 1),
+        &["layer[1]", "`height_mm`"],
+    );
+    // A key in the wrong section.
+    refused(&with("strict = true\n"), kind, (3, 1), &["belongs in the top of the file"]);
+    refused("pitch_mm = 1\n[artwork]\nfile = \"a\"\n", kind, (1, 1), &["belongs in [relief]"]);
+    refused(&with("qqqqq = 1\n"), kind, (3, 1), &["not known", "font_dirs"]);
+    refused(
+        &with("[[layer]]\nselect = \"all\"\nsurface = { profil = \"round\" }\n"),
+        kind,
+        (5, 13),
+        &["`profile`"],
+    );
+}
+
+#[test]
+fn wrong_units_say_the_right_key_and_the_converted_value() {
+    let kind = |e: &JobError| matches!(e, JobError::WrongUnit(_));
+    refused(&with("[stock]\nwidth_in = 6\n"), kind, (4, 1), &["`width_mm`", "width_mm = 152.4"]);
+    refused(&with("[stock]\nwidth_cm = 12.5\n"), kind, (4, 1), &["width_mm = 125"]);
+    refused(&with("[stock]\nwidth = 6\n"), kind, (4, 1), &["did you mean `width_mm`?"]);
+    let operation = with("[[operation]]\nkind = \"raster\"\nstepover_in = 0.1\n");
+    refused(&operation, kind, (5, 1), &["stepover_mm = 2.54"]);
+    let operation = with("[[operation]]\nkind = \"raster\"\nfeed_ipm = 100\n");
+    refused(&operation, kind, (5, 1), &["feed_mm_per_min = 2540"]);
+    refused(&with("[safety]\nramp = 3\n"), kind, (4, 1), &["`ramp_deg`"]);
+}
+
+#[test]
+fn wrong_types_say_what_there_is_and_what_is_wanted() {
+    let kind = |e: &JobError| matches!(e, JobError::WrongType(_));
+    refused(
+        &with("[relief]\ndepth_mm = \"8 mm\"\n"),
+        kind,
+        (4, 12),
+        &["this is text", "write depth_mm = 8:"],
+    );
+    refused(&with("[relief]\ndepth_mm = true\n"), kind, (4, 12), &["this is true or false"]);
+    refused(&with("[stock]\nwidth_mm = [1]\n"), kind, (4, 12), &["this is a list"]);
+    refused("strict = 1\n[artwork]\nfile = \"a\"\n", kind, (1, 10), &["true or false"]);
+    refused("[artwork]\nfile = 3\n", kind, (2, 8), &["text in"]);
+    refused("[artwork]\nfile = \"  \"\n", kind, (2, 8), &["this is empty"]);
+    refused(&with("at = [1, 2, 3]\n"), kind, (3, 6), &["\"center\" or [x, y]"]);
+    refused(&with("at = [1, \"2\"]\n"), kind, (3, 10), &["this is text"]);
+    refused(&with("font_dirs = \"fonts\"\n"), kind, (3, 13), &["a list of texts"]);
+    refused(&with("[relief]\nbackground = 3\n"), kind, (4, 14), &["leave_mm = N"]);
+    refused(&with("[[operation]]\nkind = 3\n"), kind, (4, 8), &["\"rough\" or \"raster\""]);
+    refused(&with("[layer]\nselect = \"all\"\n"), kind, (3, 1), &["[[layer]]"]);
+    refused("artwork = 3\n", kind, (1, 11), &["an [artwork] table"]);
+}
+
+#[test]
+fn numbers_out_of_range_say_the_range() {
+    let kind = |e: &JobError| matches!(e, JobError::OutOfRange(_));
+    for bad in [
+        "nan",
+        "inf",
+        "-inf",
+        "0",
+        "-3",
+        "1e300",
+        "1e999",
+        "1000000000000000000000000000000000000000",
+    ] {
+        let text = with(&format!("[stock]\nwidth_mm = {bad}\n"));
+        refused(&text, kind, (4, 12), &["stock.width_mm must lie between 1 and 10000 mm"]);
+    }
+    refused(&with("[relief]\npitch_mm = 0.001\n"), kind, (4, 12), &["between 0.005 and 5 mm"]);
+    refused(&with("at = [0, 20000]\n"), kind, (3, 10), &["between -10000 and 10000"]);
+    refused(&with("[[layer]]\nselect = \"all\"\nslope_cap = 0\n"), kind, (5, 13), &["0.05"]);
+    let inline = with(
+        "[[operation]]\nkind = \"rough\"\ncutter = { shape = \"flat\", diameter_mm = 6, flutes = 99, flute_mm = 20, stickout_mm = 30 }\n",
+    );
+    refused(&inline, kind, (5, 54), &["between 1 and 12"]);
+}
+
+#[test]
+fn unknown_names_name_the_nearest() {
+    let kind = |e: &JobError| matches!(e, JobError::UnknownName(_));
+    refused(
+        "machine = \"shapeoco3\"\n[artwork]\nfile = \"a\"\n",
+        kind,
+        (1, 11),
+        &["did you mean \"shapeoko3\"?"],
+    );
+    refused(
+        &with("[stock]\nwood = \"beach\"\n"),
+        kind,
+        (4, 8),
+        &["did you mean \"beech\"?", "oak"],
+    );
+    refused(
+        &with("[stock]\norigin = \"lower left\"\n"),
+        kind,
+        (4, 10),
+        &["did you mean \"lower-left\"?"],
+    );
+    let cutter = with("[[operation]]\nkind = \"raster\"\ncutter = \"ball3\"\n");
+    refused(&cutter, kind, (5, 10), &["did you mean \"ball-3\"?"]);
+    let contour = with("[[operation]]\nkind = \"contour\"\n");
+    refused(&contour, kind, (4, 8), &["contour", "there is: rough, raster"]);
+    let layer = |line: &str| with(&format!("[[layer]]\nselect = \"all\"\n{line}\n"));
+    refused(&layer("surface = \"ruled\""), kind, (5, 11), &["ruled", "there is: profile"]);
+    refused(
+        &layer("surface = { method = \"butterfly\", levels = 4 }"),
+        kind,
+        (5, 22),
+        &["butterfly"],
+    );
+    refused(&layer("combine = \"maximum\""), kind, (5, 11), &["did you mean \"max\"?"]);
+    let select = |text: &str| with(&format!("[[layer]]\nselect = \"{text}\"\n"));
+    refused(&select("fill:tomatoe"), kind, (4, 10), &["did you mean \"fill:tomato\"?"]);
+    refused(&select("fill:#12345"), kind, (4, 10), &["not a colour"]);
+    refused(&select("fil:#123456"), kind, (4, 10), &["did you mean \"fill:\"?"]);
+    refused(&select("#123456"), kind, (4, 10), &["did you mean \"fill:#123456\"?"]);
+    refused(&select("label:"), kind, (4, 10), &["empty"]);
+    // Selectors that take nothing: the nearest that takes something.
+    refused(
+        &select("fill:#008464"),
+        kind,
+        (4, 10),
+        &["did you mean \"fill:#008463\"?", "fill:#ff6cc7"],
+    );
+    refused(&select("label:petal"), kind, (4, 10), &["did you mean \"label:petals\"?"]);
+}
+
+#[test]
+fn missing_keys_are_named() {
+    let kind = |e: &JobError| matches!(e, JobError::Missing(_));
+    refused("title = \"x\"\n[artwork]\nwidth_mm = 3\n", kind, (2, 1), &["`file` is missing"]);
+    refused("title = \"x\"\n", kind, (1, 1), &["`artwork` is missing", "file ="]);
+    refused("", kind, (1, 1), &["`artwork` is missing"]);
+    refused(&with("[[layer]]\nname = \"x\"\n"), kind, (3, 1), &["`select` is missing in layer[0]"]);
+    refused(
+        &with("[[layer]]\nselect = \"all\"\ncombine = \"add\"\n"),
+        kind,
+        (5, 11),
+        &["height_mm"],
+    );
+}
+
+#[test]
+fn syntax_errors_have_a_place() {
+    let kind = |e: &JobError| matches!(e, JobError::Syntax(_));
+    refused("[artwork]\nfile = lotus.svg\n", kind, (2, 8), &["not TOML"]);
+    refused("[artwork\nfile = \"a\"\n", kind, (1, 9), &["not TOML"]);
+    refused("[artwork]\nfile = \"a\"\nfile = \"b\"\n", kind, (3, 1), &["duplicate"]);
+    refused("title = \"é\"\r\n[artwork]\r\nfile = \"ü\" x\r\n", kind, (3, 12), &["not TOML"]);
+}
+
+#[test]
+fn columns_count_characters() {
+    let kind = |e: &JobError| matches!(e, JobError::UnknownKey(_));
+    let text = with("[[layer]]\nselect = \"all\"\nsurface = { \"é\" = 1 }\n");
+    refused(&text, kind, (5, 13), &[]);
+    let kind = |e: &JobError| matches!(e, JobError::WrongType(_));
+    refused(
+        "title = { \"äöü\" = 1 }\n[artwork]\nfile = \"a\"\n",
+        kind,
+        (1, 9),
+        &["this is a table"],
+    );
+}
+
+#[test]
+fn what_does_not_fit_together_is_refused() {
+    let kind = |e: &JobError| matches!(e, JobError::Impossible(_));
+    refused(&with("scale = 2\nwidth_mm = 3\n"), kind, (3, 9), &["given twice"]);
+    refused(
+        &with("width_mm = 140\n[stock]\nwidth_mm = 120\n"),
+        kind,
+        (5, 12),
+        &["140 mm long in X", "only 120 mm"],
+    );
+    refused(
+        &with("at = [100, 0]\n[stock]\nwidth_mm = 200\nheight_mm = 200\n"),
+        kind,
+        (3, 6),
+        &["sticks out of the stock by 50 mm"],
+    );
+    refused(&with("at = [-5, 0]\n"), kind, (3, 6), &["sticks out of the stock by 5 mm"]);
+    refused(
+        &with(
+            "[relief]\nbackground = { frame_mm = 30 }\n[stock]\nwidth_mm = 200\nheight_mm = 200\n",
+        ),
+        kind,
+        (4, 14),
+        &["frame of 30 mm covers 5 mm"],
+    );
+    refused(
+        &with("width_mm = 500\n"),
+        kind,
+        (3, 12),
+        &["Shapeoko 3 can travel 425 mm in X", "520 mm"],
+    );
+    refused(&with("[stock]\nthickness_mm = 8\n"), kind, (4, 16), &["8 mm deep", "8 mm thick"]);
+    refused(&with("[relief]\ndepth_mm = 20\n"), kind, (4, 12), &["20 mm deep"]);
+    refused(
+        &with("[stock]\nthickness_mm = 100\n[relief]\ndepth_mm = 78\n"),
+        kind,
+        (6, 12),
+        &["80 mm in Z", "83 mm"],
+    );
+    refused(&with("[relief]\npitch_mm = 0.005\n"), kind, (4, 12), &["pitch_mm = ", "MiB"]);
+    refused(
+        &with("[tolerance]\nfit_mm = 0.008\n"),
+        kind,
+        (4, 10),
+        &["must not be more than gouge_mm"],
+    );
+    refused(&with("[safety]\nclearance_mm = 9\n"), kind, (4, 16), &["safe_z_mm 5"]);
+    refused(
+        &with("[[layer]]\nselect = \"all\"\nheight_mm = 9\n"),
+        kind,
+        (5, 13),
+        &["rise 1 mm above the stock"],
+    );
+    refused(
+        &with("[[layer]]\nselect = \"all\"\nheight_mm = 0\ncombine = \"multiply\"\n"),
+        kind,
+        (5, 13),
+        &["above 0"],
+    );
+    refused(&with("[relief]\nbackground = {}\n"), kind, (4, 14), &["frame_mm or leave_mm"]);
+}
+
+#[test]
+fn operations_that_cannot_be_done_are_refused() {
+    let kind = |e: &JobError| matches!(e, JobError::Impossible(_));
+    let operation = |lines: &str| with(&format!("[[operation]]\n{lines}\n"));
+    refused(
+        &operation("kind = \"raster\"\nleave_mm = 1"),
+        kind,
+        (5, 12),
+        &["means nothing to a raster"],
+    );
+    refused(
+        &operation("kind = \"raster\"\nstepover_mm = 1\nscallop_mm = 0.1"),
+        kind,
+        (5, 15),
+        &["given twice"],
+    );
+    refused(
+        &operation("kind = \"raster\"\ncutter = \"flat-6\"\nscallop_mm = 0.1"),
+        kind,
+        (6, 14),
+        &["leaves no cusps"],
+    );
+    refused(&operation("kind = \"rough\"\nstepover_mm = 6.1"), kind, (5, 15), &["leave ribs"]);
+    refused(
+        &operation("kind = \"rough\"\nstepdown_mm = 30"),
+        kind,
+        (5, 15),
+        &["deeper than the flutes"],
+    );
+    refused(
+        &operation("kind = \"raster\"\nfeed_mm_per_min = 5001"),
+        kind,
+        (5, 19),
+        &["from 0 to 5000 mm/min"],
+    );
+    refused(
+        &operation("kind = \"raster\"\nspindle_rpm = 5000"),
+        kind,
+        (5, 15),
+        &["from 10000 to 30000"],
+    );
+    refused(
+        &operation(
+            "kind = \"raster\"\ncutter = { shape = \"ball\", diameter_mm = 99, flute_mm = 60, stickout_mm = 90 }",
+        ),
+        kind,
+        (5, 10),
+        &["wider than the stock"],
+    );
+    refused(
+        &operation(
+            "kind = \"raster\"\ncutter = { shape = \"ball\", diameter_mm = 0.1, flute_mm = 1, stickout_mm = 9 }",
+        ),
+        kind,
+        (5, 10),
+        &["too fine", "pitch_mm to 0.05"],
+    );
+}
+
+#[test]
+fn artwork_that_holds_nothing_is_refused() {
+    let nothing = Found { size: DVec2::ZERO, unit_mm: None, layers: vec![], selectors: vec![] };
+    let error = draft(&with("")).unwrap().settle(&nothing).unwrap_err();
+    assert_eq!((error.line(), error.column()), (Some(2), Some(8)));
+    for size in [DVec2::new(0.0, 5.0), DVec2::NAN, DVec2::INFINITY, DVec2::NEG_INFINITY] {
+        let broken = Found { size, ..found() };
+        let error = Draft::for_artwork("a.svg", &Library::built_in()).settle(&broken).unwrap_err();
+        assert!(matches!(error, JobError::Impossible(_)), "{error}");
+        assert!(error.to_string().contains("a.svg holds nothing"), "{error}");
+        assert_eq!(error.line(), None);
+    }
+    let huge = Found { size: DVec2::new(1e300, 1e-300), unit_mm: Some(1.0), ..found() };
+    let error = Draft::for_artwork("a.svg", &Library::built_in()).settle(&huge).unwrap_err();
+    assert!(error.to_string().contains("10000 mm"), "{error}");
+}

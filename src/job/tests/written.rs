@@ -1,0 +1,252 @@
+//! What the module writes: the table of defaults, templates and resolved jobs read back as what they say.
+
+use super::*;
+
+#[test]
+fn defaults_of_the_table_pass_their_own_checks() {
+    for section in keys::JOB.iter().chain(&[&keys::MACHINE, &keys::CUTTER, &keys::WOOD]) {
+        for key in section.keys {
+            let good = match (key.kind, key.default) {
+                (keys::Kind::Number { min, max, .. }, keys::Fallback::Number(value)) => {
+                    min <= value && value <= max
+                }
+                (keys::Kind::Choice(words), keys::Fallback::Text(text)) => words.contains(&text),
+                _ => true,
+            };
+            assert!(good, "{}.{}", section.name, key.name);
+        }
+    }
+}
+
+#[test]
+fn the_defaults_table_shows_every_key() {
+    let table = defaults_table();
+    for section in keys::JOB.iter().skip(1) {
+        for key in section.keys {
+            assert!(table.contains(&format!("  {} ", key.name)), "{}.{}", section.name, key.name);
+        }
+    }
+    for line in ["chord_mm", "0.02", "fit_mm", "0.004", "shapeoko3", "\"beech\""] {
+        assert!(table.contains(line), "{line}");
+    }
+}
+
+/// Takes the `#` away from every commented key.
+fn uncommented(text: &str) -> String {
+    let is_key = |line: &str| {
+        line.strip_prefix("# ")
+            .and_then(|rest| rest.split_once(" = "))
+            .is_some_and(|(key, _)| key.bytes().all(|b| b.is_ascii_lowercase() || b == b'_'))
+    };
+    let lines = text.lines().map(|line| if is_key(line) { &line[2..] } else { line });
+    lines.collect::<Vec<_>>().join("\n")
+}
+
+#[test]
+fn the_template_shows_the_artwork() {
+    let text = template("lotus.svg", &found(), &Library::built_in()).unwrap();
+    assert_eq!(text.matches("[[layer]]").count(), 2);
+    for line in [
+        "file = \"lotus.svg\"",
+        "select = \"fill:#008463\"",
+        "name = \"hotpink\"",
+        // 2500 px^2 at 0.75 mm a px.
+        "# fill:#ff6cc7: area 1406 mm^2, 75.0 x 37.5 mm",
+        "# pitch_mm = 0.085",
+        "cutter = \"ball-3\"",
+    ] {
+        assert!(text.contains(line), "'{line}' is not in\n{text}");
+    }
+}
+
+#[test]
+fn artwork_too_large_for_the_machine_still_gets_a_template() {
+    let library = Library::built_in();
+    let huge = Found { unit_mm: Some(10.0), ..found() };
+    let error = Draft::for_artwork("a.svg", &library).settle(&huge).unwrap_err();
+    assert!(error.to_string().contains("relievo new a.svg"), "{error}");
+    let text = template("a.svg", &huge, &library).unwrap();
+    // The machine travels 425 mm; the stock keeps 10 mm on each side.
+    assert!(text.contains("\nwidth_mm = 405 "), "{text}");
+    let job =
+        Draft::from_toml(&text, "t.toml", &library, &no_files).unwrap().settle(&huge).unwrap();
+    assert_eq!((job.stock.width_mm, job.artwork_size_mm.y), (425.0, 202.5));
+    let nothing = Found { size: DVec2::ZERO, ..found() };
+    let error = template("a.svg", &nothing, &library).unwrap_err();
+    assert!(error.to_string().contains("holds nothing"), "{error}");
+}
+
+#[test]
+fn rules_name_the_numbers_that_they_work_with() {
+    use keys::rule;
+    let rule_of = |section: &keys::Section, key: &str| match section.key(key).unwrap().default {
+        keys::Fallback::Rule(text) => text,
+        _ => panic!("{key} has no rule"),
+    };
+    let percent = |part: f64| format!("{} %", part * 100.0);
+    for (section, key, parts) in [
+        (&keys::STOCK, "width_mm", vec![rule::MARGIN_MM.to_string()]),
+        (&keys::ARTWORK, "width_mm", vec![rule::PIXEL_ART_MM.to_string()]),
+        (
+            &keys::RELIEF,
+            "pitch_mm",
+            vec![
+                rule::NODES.to_string(),
+                rule::PITCH_MM.0.to_string(),
+                rule::PITCH_MM.1.to_string(),
+            ],
+        ),
+        (&keys::BACKGROUND, "leave_mm", vec![rule::LEAVE_EXTRA_MM.to_string()]),
+        (
+            &keys::LAYER,
+            "height_mm",
+            vec![percent(rule::LOWEST_LAYER), rule::HEADROOM_MM.to_string()],
+        ),
+        (&keys::OPERATION, "cutter", vec![rule::CUTTERS.0.to_owned(), rule::CUTTERS.1.to_owned()]),
+        (
+            &keys::OPERATION,
+            "stepover_mm",
+            vec![percent(rule::ROUGH_STEPOVER), percent(rule::FLAT_STEPOVER)],
+        ),
+        (&keys::OPERATION, "plunge_mm_per_min", vec![percent(rule::PLUNGE)]),
+        (&keys::OPERATION, "spindle_rpm", vec![rule::SPINDLE_RPM.to_string()]),
+    ] {
+        let text = rule_of(section, key);
+        for part in parts {
+            assert!(text.contains(&part), "{key}: '{part}' is not in '{text}'");
+        }
+    }
+}
+
+fn any_selector() -> impl Strategy<Value = Selector> {
+    let color = any::<(u8, u8, u8)>().prop_map(|(r, g, b)| Rgb(r, g, b));
+    prop_oneof![
+        color.clone().prop_map(Selector::Fill),
+        color.prop_map(Selector::Stroke),
+        "[^\\s:][^:]{0,12}[^\\s:]".prop_map(Selector::Label),
+    ]
+}
+
+fn any_found() -> impl Strategy<Value = Found> {
+    let layer = (any_selector(), "\\PC{0,8}", 0.0..1e4_f64);
+    let layers = prop::collection::vec(layer, 1..9);
+    (layers, 1.0..400.0_f64, 0.2..4.0_f64, prop::option::of(0.3..0.9_f64)).prop_map(
+        |(layers, width, ratio, unit_mm)| {
+            let size = DVec2::new(width, width * ratio);
+            let layers: Vec<FoundLayer> = layers
+                .into_iter()
+                .map(|(select, name, area)| FoundLayer { select, name, area, size })
+                .collect();
+            let selectors = layers.iter().map(|layer| layer.select.clone()).collect();
+            Found { size, unit_mm, layers, selectors }
+        },
+    )
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+
+    /// The template means the same as no job file, as it is and with every default written out.
+    #[test]
+    fn the_template_is_the_default_job(found in any_found(), file in "[^\\x00]{0,12}[a-zäöü\"\\\\]") {
+        let library = Library::built_in();
+        let Ok(plain) = Draft::for_artwork(&file, &library).settle(&found) else { return Err(TestCaseError::reject("does not fit the machine")) };
+        let text = template(&file, &found, &library).unwrap();
+        let read = |text: &str| {
+            Draft::from_toml(text, "t.toml", &library, &no_files).unwrap().settle(&found).unwrap()
+        };
+        prop_assert_eq!(&read(&text), &plain);
+        let mut written_out = read(&uncommented(&text));
+        // Written out, the artwork's width is no longer a choice of the program, and worth no note.
+        prop_assert_eq!(written_out.artwork.fit, Fit::Width(plain.artwork_size_mm.x));
+        prop_assert!((written_out.artwork_unit_mm / plain.artwork_unit_mm - 1.0).abs() < 1e-12);
+        prop_assert!((written_out.artwork_size_mm - plain.artwork_size_mm).length() < 1e-9);
+        prop_assert!((written_out.artwork_lower_left_mm - plain.artwork_lower_left_mm).length() < 1e-9);
+        written_out.artwork.fit = plain.artwork.fit;
+        written_out.artwork_unit_mm = plain.artwork_unit_mm;
+        written_out.artwork_size_mm = plain.artwork_size_mm;
+        written_out.artwork_lower_left_mm = plain.artwork_lower_left_mm;
+        written_out.notes.clone_from(&plain.notes);
+        prop_assert_eq!(written_out, plain);
+    }
+
+    /// The resolved job gives the same job again.
+    #[test]
+    fn the_resolved_job_repeats(
+        found in any_found(),
+        numbers in (1.0..60.0_f64, 0.5..7.5_f64, -360.0..360.0_f64, 0.5..30.0_f64),
+        origin in 0..5_usize,
+        background in prop_oneof![
+            Just("\"clear\""), Just("\"leave\""), Just("{ frame_mm = 3.3 }"), Just("{ leave_mm = 12.7 }")
+        ],
+        profile in 0..5_usize,
+        title in "\\PC*",
+    ) {
+        let (draft_deg, height, angle, ramp) = numbers;
+        let origin = keys::ORIGINS[origin];
+        let profile = keys::PROFILES[profile];
+        let title = serde_json::to_string(&format!("x{title}")).unwrap();
+        let text = format!(
+            "title = {title}\nmachine = \"longmill30\"\n[stock]\norigin = \"{origin}\"\ngrain_deg = {angle}\n\
+             wood = \"oak\"\n[artwork]\nfile = \"a\\tb.svg\"\nheight_mm = 90\nfont_dirs = [\"x\", \"y\"]\n\
+             [relief]\nbackground = {background}\n[safety]\nramp_deg = {ramp}\n\
+             [[layer]]\nselect = \"all\"\nheight_mm = {height}\ndraft_deg = {draft_deg}\n\
+             surface = {{ profile = \"{profile}\", radius_mm = 2.5 }}\nslope_cap = \"none\"\nunion = true\n\
+             [[operation]]\nkind = \"rough\"\nstepdown_mm = 0.7\nangle_deg = {angle}\n\
+             [[operation]]\nkind = \"raster\"\ncutter = \"ball-6\"\nstepover_mm = 0.3\n\
+             [[operation]]\nkind = \"raster\"\nangle_deg = {ramp}\n"
+        );
+        let library = Library::built_in();
+        let load = |text: &str| {
+            Draft::from_toml(text, "t.toml", &library, &no_files).and_then(|draft| draft.settle(&found))
+        };
+        let Ok(mut job) = load(&text) else { return Err(TestCaseError::reject("does not fit the machine")) };
+        let mut again = load(&job.to_toml()).map_err(|error| TestCaseError::fail(error.to_string()))?;
+        job.notes.clear();
+        again.notes.clear();
+        prop_assert_eq!(&again, &job);
+        prop_assert_eq!(again.to_toml(), job.to_toml());
+    }
+
+    /// Whatever the text, reading it ends in a draft or in an error with a picture; it never panics.
+    #[test]
+    fn any_text_is_read_or_refused(
+        pieces in prop::collection::vec(
+            prop_oneof![
+                "\\PC{0,6}".boxed(),
+                prop::sample::select(vec![
+                    "[artwork]\n", "file = ", "\"a.svg\"\n", "[[layer]]\n", "[[operation]]\n", "select = ",
+                    "\"all\"\n", "surface = ", "{ method = ", "}\n", "kind = ", "\"rough\"\n", "\n", "[stock]\n",
+                    "wood = ", "machine = ", "1e9\n", "nan\n", "[1, 2]\n", "at = ", "height_mm = ", "cutter = ",
+                    "background = ", "\"leave\"\n", "\t", "é", "\u{0}", "\r\n", "1979-05-27\n", "true\n",
+                ]).prop_map(str::to_owned).boxed(),
+            ],
+            0..24,
+        )
+    ) {
+        if let Err(error) = job(&pieces.concat()) {
+            prop_assert!(error.to_string().starts_with("error: "));
+            prop_assert!(error.line().is_some());
+        }
+    }
+}
+#[test]
+fn hostile_nesting_is_refused() {
+    let deep = 200_000;
+    for text in [
+        format!("title = {}", "[".repeat(deep)),
+        format!("title = {}{}", "[".repeat(deep), "]".repeat(deep)),
+        format!("title = {}", "{a=".repeat(deep)),
+        format!("{}a = 1", "a.".repeat(deep)),
+        format!("[{}a]", "a.".repeat(deep)),
+    ] {
+        let error = job(&text).unwrap_err();
+        assert_eq!(error.line(), Some(1));
+        assert!(error.to_string().len() < 2000, "{} bytes", error.to_string().len());
+    }
+}
+
+#[test]
+fn a_byte_order_mark_is_no_fault() {
+    assert_eq!(job("\u{feff}[artwork]\nfile = \"a.svg\"\n").unwrap().artwork.file, "a.svg");
+}
