@@ -13,7 +13,8 @@
 //! | `cutter` | cutter shapes: height of the profile at a radius, tip, flank, shank, holder | geom job |
 //! | `artwork` | SVG bytes -> curves by layer, closed or open, every one resolved or refused | geom job |
 //! | `outline` | curves -> `Region`s (outer ring + holes): flatten, resolve, orient, nest | geom job artwork |
-//! | `surface` | region + layer settings -> `Mesh` or height field; one file per method | geom job outline |
+//! | `skeleton` | `Region` -> resampled rings, constrained Delaunay triangles, classes T/S/J, cells, runs, spine | geom job outline |
+//! | `surface` | region + cells + layer settings -> `Mesh` or height field; one file per method | geom job outline skeleton |
 //! | `relief` | layers' surfaces -> the relief heightfield: rasterise, combine, blend, background: the *target* | geom job outline surface |
 //! | `offset` | heightfield x cutter -> tool-tip field and exact drops at points | geom job cutter relief |
 //! | `stock` | the wood as a heightfield; removes plain moves of a cutter from it | geom job cutter |
@@ -31,6 +32,7 @@ pub mod job;
 pub mod cutter;
 pub mod artwork;
 pub mod outline;
+pub mod skeleton;
 pub mod surface;
 pub mod relief;
 pub mod offset;

@@ -217,12 +217,13 @@ pub fn raise(
     if over > grid.pitch_mm {
         remarks.push(Remark::OverTheEdge { by_mm: over });
     }
-    let surface = match layer.surface {
-        SurfaceSpec::Profile { profile, radius_mm } => {
-            let flank = profile::Flank::of(layer, profile, radius_mm);
-            Surface::Field(profile::raise(figure, &flank, grid, &mut remarks))
-        }
+    let (profile, radius_mm) = match &layer.surface {
+        SurfaceSpec::Profile { profile, radius_mm } => (*profile, *radius_mm),
+        // No job can ask for these yet.
+        SurfaceSpec::Ruled(crest) | SurfaceSpec::Ratio(crest) => (crest.profile, None),
     };
+    let flank = profile::Flank::of(layer, profile, radius_mm);
+    let surface = Surface::Field(profile::raise(figure, &flank, grid, &mut remarks));
     Ok(RaisedFigure { surface, remarks })
 }
 
@@ -267,7 +268,10 @@ fn check_numbers(figure: &Figure, layer: &LayerSpec) -> Result<(), SurfaceError>
             figure: figure.source.clone(),
         });
     }
-    let SurfaceSpec::Profile { radius_mm, .. } = layer.surface;
+    let radius_mm = match layer.surface {
+        SurfaceSpec::Profile { radius_mm, .. } => radius_mm,
+        SurfaceSpec::Ruled(_) | SurfaceSpec::Ratio(_) => None,
+    };
     let right_angle = std::f64::consts::FRAC_PI_2;
     let checks = [
         ("height_mm", layer.height_mm, layer.height_mm.is_finite(), "give a finite height"),

@@ -172,9 +172,15 @@ fn layers(carving: &Carving) -> Vec<LayerRow> {
     rows.map(|(spec, outlines)| LayerRow {
         name: spec.name.clone(),
         select: spec.select.to_string(),
-        surface: match spec.surface {
+        surface: match &spec.surface {
             SurfaceSpec::Profile { profile, .. } => {
                 format!("profile, {}", format!("{profile:?}").to_lowercase())
+            }
+            SurfaceSpec::Ruled(crest) => {
+                format!("ruled, {}", format!("{:?}", crest.profile).to_lowercase())
+            }
+            SurfaceSpec::Ratio(crest) => {
+                format!("ratio, {}", format!("{:?}", crest.profile).to_lowercase())
             }
         },
         combine: format!("{:?}", spec.combine).to_lowercase(),

@@ -307,7 +307,7 @@ pub struct LayerSpec {
 }
 
 /// How a layer's surface is made from its outline.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
 #[serde(rename_all = "kebab-case", tag = "method")]
 #[non_exhaustive]
 pub enum SurfaceSpec {
@@ -319,6 +319,118 @@ pub enum SurfaceSpec {
         /// `None`: the largest inscribed radius of each figure.
         radius_mm: Option<f64>,
     },
+    /// B+: symmetric rungs from the skeleton, ruled; junctions are squircle kites. Falls back to
+    /// [`SurfaceSpec::Ratio`] where its checks fail.
+    Ruled(CrestSpec),
+    /// Ratio field: height by the distance to the outline over the sum of those to outline and spine.
+    Ratio(CrestSpec),
+}
+
+/// What a surface that rises from the outline to the crest over the spine is made with.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct CrestSpec {
+    /// Cross-section from the outline to the crest.
+    pub profile: Profile,
+    /// Exponent p in 0..=1 of `h = H (w / w_max)^p`: 0 = a level crest, 1 = proportional to the width.
+    pub width_power: f64,
+    /// Multiplier of the crest's height over each branch's normalised length: (place in 0..=1, factor
+    /// >= 0), places rising, the first 0, the last 1. Empty: none.
+    pub along: Vec<[f64; 2]>,
+    /// Height of the outline on holes, mm; `None`: the layer's `base_mm`.
+    pub hole_base_mm: Option<f64>,
+    /// How the skeleton is found.
+    pub skeleton: SkeletonSpec,
+}
+
+impl Default for CrestSpec {
+    fn default() -> Self {
+        Self {
+            profile: Profile::Parabola,
+            width_power: 0.0,
+            along: Vec::new(),
+            hole_base_mm: None,
+            skeleton: SkeletonSpec::default(),
+        }
+    }
+}
+
+/// How the skeleton of an outline is found.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct SkeletonSpec {
+    /// Wanted edge length of the resampled outline, mm; `None`: area over perimeter.
+    pub edge_mm: Option<f64>,
+    /// Vertices that turn by at least this are corners, radians; infinite = none is.
+    pub corner_rad: f64,
+    /// When terminal branches stop being cut back.
+    pub prune: Prune,
+    /// What happens where a cut branch reaches a junction.
+    pub split: Split,
+    /// How neighbouring junction triangles are merged.
+    pub join: Join,
+    /// Branches at junctions that are too short to mean anything are cut; `None`: they stay.
+    pub significance: Option<Significance>,
+}
+
+impl Default for SkeletonSpec {
+    fn default() -> Self {
+        Self {
+            edge_mm: None,
+            corner_rad: 50_f64.to_radians(),
+            prune: Prune::InscribedDisc { delta: 0.15 },
+            split: Split::Sleeves,
+            join: Join::Clusters,
+            significance: None,
+        }
+    }
+}
+
+/// When the cutting back of a terminal branch stops.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Prune {
+    /// When the disc round the middle of the base edge that fits under the chain has a radius of at least
+    /// (1 - delta) times half the base.
+    InscribedDisc {
+        /// Tolerance, in 0..1.
+        delta: f64,
+    },
+    /// When a vertex leaves the half disc over the base edge (Igarashi et al. 1999).
+    HalfDisc,
+}
+
+/// What becomes of a junction that a cut branch reaches.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Split {
+    /// Sleeves from the junction's apex to the chain of the branch; the spine stays smooth.
+    Sleeves,
+    /// A fan round the junction's centroid (Igarashi et al. 1999).
+    Teddy,
+}
+
+/// How neighbouring junction triangles are merged.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Join {
+    /// Into convex polygons of any size.
+    Clusters,
+    /// At most in pairs.
+    Pairs,
+}
+
+/// Branches no deeper than `max(abs_mm, rel * half width of the junction)` are cut.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct Significance {
+    /// Absolute part, mm; `None`: a tenth of area over perimeter.
+    pub abs_mm: Option<f64>,
+    /// Part relative to the junction's half width.
+    pub rel: f64,
+}
+
+impl Default for Significance {
+    fn default() -> Self {
+        Self { abs_mm: None, rel: 0.15 }
+    }
 }
 
 /// Cross-section `f(u)` of a flank, u = 0 on the outline, 1 on the ridge.

@@ -282,9 +282,13 @@ fn safety_lines(job: &Job) -> Vec<Line> {
 }
 
 fn layer_lines(layer: &LayerSpec) -> Vec<Line> {
-    let SurfaceSpec::Profile { profile, radius_mm } = layer.surface;
+    let (method, profile, radius_mm) = match &layer.surface {
+        SurfaceSpec::Profile { profile, radius_mm } => ("profile", *profile, *radius_mm),
+        SurfaceSpec::Ruled(crest) => ("ruled", crest.profile, None),
+        SurfaceSpec::Ratio(crest) => ("ratio", crest.profile, None),
+    };
     let mut surface =
-        vec![("method", quoted("profile")), ("profile", quoted(PROFILES[profile as usize]))];
+        vec![("method", quoted(method)), ("profile", quoted(PROFILES[profile as usize]))];
     if let Some(radius) = radius_mm {
         surface.push(("radius_mm", number(radius)));
     }
