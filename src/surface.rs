@@ -4,17 +4,26 @@
 //! are those above the layer's reference plane; what lies below, offsets and seams are the merge's work.
 //! Whatever cannot be raised as asked for is told in [`Raised::notes`], never dropped in silence.
 
+mod crest;
 mod distance;
 mod inscribed;
 mod inside;
+mod kite;
 mod mesh;
 mod profile;
+mod ridge;
+pub mod ruled;
+mod rungs;
+mod weld;
 
 pub use distance::Segments;
 pub use inscribed::inscribed_radius;
 pub use inside::inside_spans;
 pub use mesh::{Mesh, MeshError};
 pub use profile::{capped_height, outline_height, profile_at, smooth_cap};
+pub use ridge::{Heights, Ridge};
+pub use ruled::{Density, RuledFault};
+pub use rungs::Rungs;
 
 use crate::geom::{Bounds, Grid};
 use crate::job::{LayerSpec, SurfaceSpec};
