@@ -166,11 +166,11 @@ mod tests {
         }
     }
 
-    /// On the side s = 0 the surface continues rulings that leave along -T: the height's derivative along
-    /// them is that of a sleeve, 0 for rulings parallel to the outline.
+    /// The sleeve across the side s = 0 is ruled by lines that turn evenly from the outline's direction
+    /// at the corner to the crest's at the midpoint; on them it is level, and so is the kite.
     #[test]
     fn the_kite_continues_the_rulings_across_its_side() {
-        // Straight outline through v: the sleeve across the side before is ruled along the x axis.
+        // A straight outline through v, along the x axis: (1, 0) = (a - b) / 2.
         let kite = Kite {
             plan: [v(0.0, 0.0), v(1.0, 1.0), v(0.0, 2.0), v(-1.0, 1.0)],
             tangents: [v(1.0, 0.0), v(-1.0, 0.0)],
@@ -179,13 +179,12 @@ mod tests {
         };
         let kappas = kite.kappas();
         for t in [0.2, 0.5, 0.8] {
-            // The ruling direction (1, 0) in terms of the plan's derivatives at (0, t).
+            let ruling = v(1.0, 0.0) * (2.0 * (1.0 - t)) + (kite.plan[2] - kite.plan[3]) * t;
             let e = 1e-6;
             let ds = (kite.at(e, t) - kite.at(0.0, t)) / e;
             let dt = (kite.at(0.0, t + e) - kite.at(0.0, t)) / e;
             let area = ds.perp_dot(dt);
-            let along = v(1.0, 0.0);
-            let (x, y) = (along.perp_dot(dt) / area, ds.perp_dot(along) / area);
+            let (x, y) = (ruling.perp_dot(dt) / area, ds.perp_dot(ruling) / area);
             let z = |s, t| kite.height(kappas, Profile::Parabola, s, t);
             let slope = x * (z(e, t) - z(0.0, t)) / e + y * (z(0.0, t + e) - z(0.0, t)) / e;
             assert!(slope.abs() < 1e-4, "t = {t}: {slope}");

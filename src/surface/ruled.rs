@@ -400,12 +400,7 @@ pub fn check(mesh: &Mesh, sampled: &Sampled, ridge: &Ridge) -> Result<(), RuledF
 }
 
 /// Edges shared as they must be, and those of one triangle at the height of the outline within `slack` mm.
-fn check_rim(
-    mesh: &Mesh,
-    sampled: &Sampled,
-    ridge: &Ridge,
-    slack: f64,
-) -> Result<(), RuledFault> {
+fn check_rim(mesh: &Mesh, sampled: &Sampled, ridge: &Ridge, slack: f64) -> Result<(), RuledFault> {
     let at = |v: u32| mesh.vertices[v as usize];
     let mut edges: Vec<[u32; 2]> =
         mesh.faces.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]).collect();

@@ -115,3 +115,77 @@ fn fault([a, b, c]: [DVec3; 3]) -> u32 {
         2
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn v(x: f64, y: f64, z: f64) -> DVec3 {
+        DVec3::new(x, y, z)
+    }
+
+    /// Two squares that meet in an edge whose points differ by round-off become one strip.
+    #[test]
+    fn patches_are_joined_across_round_off() {
+        let e = 1e-12;
+        let mut soup = Soup::default();
+        let one = [v(0.0, 0.0, 0.0), v(1.0, 0.0, 0.0), v(0.0, 1.0, 0.0), v(1.0, 1.0, 0.0)];
+        let two = [v(1.0 - e, e, 0.0), v(2.0, 0.0, 0.0), v(1.0 + e, 1.0, -e), v(2.0, 1.0, 0.0)];
+        soup.grid(2, one.into_iter());
+        soup.grid(2, two.into_iter());
+        let mesh = soup.weld();
+        assert_eq!((mesh.vertices.len(), mesh.faces.len()), (6, 4));
+        assert_eq!(mesh.check(), Ok(()));
+    }
+
+    /// Points on either side of any bucket's wall are joined, points a little further apart are not.
+    #[test]
+    fn buckets_have_no_walls() {
+        let mut soup = Soup::default();
+        let scale = 100.0;
+        for k in 0..1000 {
+            let at = v(scale * f64::from(k) / 999.0, 0.0, 0.0);
+            for step in [0.0, 0.4, -0.4, 2.0] {
+                soup.vertices.push(at + v(step * SAME * scale, 0.0, 0.0));
+            }
+        }
+        soup.faces.extend((0..1000_u32).map(|k| [4 * k, 4 * k + 3, (4 * k + 4) % 4000]));
+        assert_eq!(soup.weld().vertices.len(), 2000);
+    }
+
+    /// Triangles that shrink to nothing go, and a fan is left of a grid with one point for a side.
+    #[test]
+    fn degenerate_sides_leave_a_fan() {
+        let mut soup = Soup::default();
+        let pole = v(0.0, 0.0, 1.0);
+        let foot = [v(1.0, 0.0, 0.0), v(0.0, 1.0, 0.0), v(-1.0, 0.0, 0.0)];
+        soup.grid(2, foot.into_iter().flat_map(|f| [pole, f]));
+        let mesh = soup.weld();
+        assert_eq!((mesh.vertices.len(), mesh.faces.len()), (4, 2));
+        assert_eq!(mesh.check(), Ok(()));
+    }
+
+    /// A quadrilateral with a reflex corner is cut where both triangles stay upright.
+    #[test]
+    fn the_diagonal_turns_no_triangle_over() {
+        let plan = [v(0.0, 0.0, 0.0), v(4.0, 0.0, 0.0), v(1.0, 1.0, 0.0), v(0.0, 4.0, 0.0)];
+        for turn in 0..4 {
+            let p: Vec<DVec3> = (0..4).map(|k| plan[(k + turn) % 4]).collect();
+            let mut soup = Soup::default();
+            soup.grid(2, [p[0], p[1], p[3], p[2]].into_iter());
+            assert_eq!(soup.weld().check(), Ok(()));
+        }
+    }
+
+    #[test]
+    fn nothing_and_nonsense_are_welded_without_panic() {
+        assert!(Soup::default().weld().vertices.is_empty());
+        let mut soup = Soup::default();
+        let odd = [f64::NAN, f64::INFINITY, -1e300, 1e300].map(|x| v(x, 0.0, x));
+        soup.grid(2, odd.into_iter());
+        soup.weld();
+        let mut soup = Soup::default();
+        soup.grid(2, [DVec3::ONE; 4].into_iter());
+        assert!(soup.weld().faces.is_empty());
+    }
+}
