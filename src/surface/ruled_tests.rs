@@ -164,7 +164,6 @@ fn a_half_curve_has_the_values_of_the_specification() {
 fn a_rectangle_is_a_trough_of_parabolas() {
     let made = rectangle();
     let mesh = made.mesh(0.05, 16);
-    println!("FIG rectangle {}", volume(&mesh));
     near(volume(&mesh), 12.6537, 5e-4);
     near(area(&mesh), 20.0, 1e-9);
     let over = mesh.vertices.iter().filter(|p| (1.0..=9.0).contains(&p.x));
@@ -178,7 +177,6 @@ fn a_rectangle_is_a_trough_of_parabolas() {
 #[test]
 fn an_annulus_is_a_ring_of_parabolas() {
     let mesh = annulus(316).mesh(0.1, 16);
-    println!("FIG annulus {}", volume(&mesh));
     near(volume(&mesh), 33.478, 1e-4);
     let off = |p: DVec3| {
         let r = p.truncate().length() - 4.0;
@@ -199,14 +197,13 @@ fn an_annulus_is_a_ring_of_parabolas() {
         }
     }
     let rms = (squares / whole).sqrt();
-    println!("FIG annulus rms {rms} worst {worst}");
-    assert!(worst <= 0.00145 && (0.00075..0.00085).contains(&rms), "rms {rms}, worst {worst}");
+    // .0008 and .0014 to the last place given.
+    assert!((rms - 0.0008).abs() < 5e-5 && (worst - 0.0014).abs() < 5e-5, "{rms} {worst}");
 }
 
 #[test]
 fn four_caps_round_one_junction() {
     let mesh = plus().mesh(0.1, 16);
-    println!("FIG plus {} {}", area(&mesh), volume(&mesh));
     near(area(&mesh), 28.902, 3e-3);
     near(volume(&mesh), 16.005, 3e-3);
 }
