@@ -8,6 +8,7 @@ mod crest;
 mod distance;
 mod inscribed;
 mod inside;
+mod kite;
 mod mesh;
 mod patch;
 mod profile;
