@@ -5,11 +5,13 @@
 //! Whatever cannot be raised as asked for is told in [`Raised::notes`], never dropped in silence.
 
 mod crest;
+mod crested;
 mod distance;
 mod inscribed;
 mod inside;
 mod kite;
 mod mesh;
+mod weld;
 mod patch;
 mod profile;
 mod ratio;
@@ -17,7 +19,7 @@ mod ridge;
 mod ruled;
 mod rungs;
 
-pub use crest::{Fineness, Skeleton, lower_walls, ridge_of};
+pub use crested::{Fineness, Skeleton, lower_walls, ridge_of};
 pub use distance::Segments;
 pub use inscribed::inscribed_radius;
 pub use inside::inside_spans;
@@ -26,7 +28,7 @@ pub use patch::{FINE, FINE_ROWS, Patch, Window, averaged};
 pub use profile::{capped_height, outline_height, profile_at, smooth_cap};
 pub use ratio::field as ratio_field;
 pub use ridge::{Heights, Ridge};
-pub use ruled::RuledFault;
+pub use ruled::{Density, RuledFault, check as check_ruled, mesh as ruled_mesh};
 pub use rungs::{Rungs, rungs};
 
 use crate::geom::{Bounds, Grid, Tolerance};
@@ -162,8 +164,8 @@ pub fn raise(
         remarks.push(Remark::OverTheEdge { by_mm: over });
     }
     let mut raise_crest = |crest, ratio| {
-        let method = crest::Method { crest, ratio };
-        crest::raise(figure, layer, method, grid, tolerance, &mut remarks)
+        let method = crested::Method { crest, ratio };
+        crested::raise(figure, layer, method, grid, tolerance, &mut remarks)
     };
     let surface = match &layer.surface {
         SurfaceSpec::Ruled(crest) => raise_crest(crest, false),

@@ -1,275 +1,138 @@
-//! Surfaces that rise from the outline to a crest over the spine: B+ with the ratio field to fall back on.
-//!
-//! ```text
-//!   Region -> Skeleton (rings, cells, rungs, spine) -> Heights of the crest -> ruled mesh --checks--> Mesh
-//!                                                                                  \--fail--> ratio field
-//! ```
+//! Heights of the ridge -> heights where cells meet: at poles, centres, inner edges and rungs.
 
-use super::profile::{self, Flank};
-use super::ridge::{Heights, Ridge};
-use super::rungs::{Rungs, rungs};
-use super::{
-    FINE, Patch, Remark, Segments, Surface, Window, averaged, inscribed_radius, ratio, ruled,
-};
-use crate::geom::{DVec2, Grid, Tolerance};
-use crate::job::{CrestSpec, LayerSpec, SkeletonSpec};
-use crate::outline::{Figure, Region};
-use crate::skeleton::{
-    Cells, SampleLimits, Sampled, SkeletonError, Spine, Triangulation, cells, midlines, sample,
-    smooth, spine,
-};
-use rayon::prelude::*;
+use super::{Heights, Ridge, Rungs};
+use crate::geom::DVec2;
+use crate::skeleton::{Cells, NodeKind, RunInBranch, Sampled, Spine};
+use std::collections::BTreeMap;
 
-/// Error of a facet across the crest that is too small to matter, as a fraction of `chord_mm`.
-const FACET_PER_CHORD: f64 = 0.05;
-/// Shortest edge of the resampled outline, in cells.
-const LEAST_EDGE_CELLS: f64 = 2.0;
-/// Nodes of the window of a narrow region whose ratio field is averaged over a finer grid.
-const MOST_AVERAGED: usize = 1 << 21;
-/// Rounds of smoothing for a spine that no rungs carry.
-const SMOOTH_ROUNDS: usize = 2;
-
-/// How finely a skeleton and its surface are made.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Fineness {
-    /// Largest distance between the outline and its resampling, mm.
-    pub chord_mm: f64,
-    /// Distance of rungs and of points on the outline, mm.
-    pub spacing_mm: f64,
-    /// Edges of the resampled outline are not split below this, mm.
-    pub least_edge_mm: f64,
-    /// Facets across the crest may leave the profile by this, mm.
-    pub max_facet_mm: f64,
+/// Heights of the crest where cells need them, mm.
+#[derive(Debug)]
+pub(super) struct Crest {
+    /// At the poles of the caps.
+    pub(super) caps: Vec<f64>,
+    /// At the centres of the junctions.
+    pub(super) junctions: Vec<f64>,
+    /// At the centres of the hubs.
+    pub(super) hubs: Vec<f64>,
+    /// At the rungs of each run.
+    pub(super) runs: Vec<Vec<f64>>,
+    /// At the midpoints of the inner edges where cells other than two sleeves meet. Both cells take the
+    /// height from here, so that they cannot disagree.
+    sides: BTreeMap<[u32; 2], f64>,
 }
 
-impl Fineness {
-    /// As fine as a grid of this pitch can show, and no finer.
-    pub fn of(pitch_mm: f64, chord_mm: f64) -> Self {
-        Self {
-            chord_mm,
-            spacing_mm: pitch_mm,
-            least_edge_mm: LEAST_EDGE_CELLS * pitch_mm,
-            max_facet_mm: FACET_PER_CHORD * chord_mm,
-        }
-    }
+/// An inner edge, whichever way it is walked.
+fn key(a: u32, b: u32) -> [u32; 2] {
+    [a.min(b), a.max(b)]
 }
 
-/// A region taken apart: all that its crest surfaces are made of.
-#[derive(Debug, Clone)]
-pub struct Skeleton {
-    /// The resampled rings.
-    pub sampled: Sampled,
-    /// The triangles between their vertices.
-    pub triangulation: Triangulation,
-    /// What pruning left of them.
-    pub cells: Cells,
-    /// The rungs of each run.
-    pub rungs: Vec<Rungs>,
-    /// The spine: through the middles of the rungs where they stand upright, else through the smoothed
-    /// midpoints of the inner edges.
-    pub spine: Spine,
-    /// The spine carries the rungs' middles, so a ruled mesh can be made.
-    pub upright: bool,
-}
-
-impl Skeleton {
-    /// Takes a region apart.
-    ///
-    /// # Errors
-    /// [`SkeletonError`]: the outline cannot be triangulated.
-    pub fn of(
-        region: &Region,
-        spec: &SkeletonSpec,
-        fineness: &Fineness,
-    ) -> Result<Self, SkeletonError> {
-        let limits =
-            SampleLimits { chord_mm: fineness.chord_mm, least_edge_mm: fineness.least_edge_mm };
-        let (sampled, triangulation) = sample(region, spec, &limits)?;
-        let cells = cells(&sampled, &triangulation, spec);
-        let rungs: Vec<Rungs> =
-            cells.runs.par_iter().map(|run| rungs(&sampled, run, fineness.spacing_mm)).collect();
-        let upright = rungs.iter().all(Rungs::upright);
-        let spine = if upright {
-            let lines: Vec<_> = rungs.iter().map(Rungs::midline).collect();
-            spine(&sampled, &cells, &lines)
-        } else {
-            smooth(&spine(&sampled, &cells, &midlines(&sampled, &cells)), SMOOTH_ROUNDS)
-        };
-        Ok(Self { sampled, triangulation, cells, rungs, spine, upright })
-    }
-}
-
-/// The crest that a layer asks for, over a region with `rings` rings.
-pub fn ridge_of(layer: &LayerSpec, crest: &CrestSpec, rings: usize) -> Ridge {
-    let hole_mm = crest.hole_base_mm.unwrap_or(layer.base_mm);
-    let base_mm = (0..rings).map(|ring| if ring == 0 { layer.base_mm } else { hole_mm }).collect();
-    Ridge {
-        height_mm: layer.height_mm,
-        base_mm,
-        profile: crest.profile,
-        slope_cap: layer.slope_cap,
-        width_power: crest.width_power,
-        along: crest.along.clone(),
-    }
-}
-
-/// How the crest of a figure is raised.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Method<'a> {
-    /// The layer's crest.
-    pub(super) crest: &'a CrestSpec,
-    /// As a ratio field even where a ruled mesh could be made.
-    pub(super) ratio: bool,
-}
-
-/// Raises every region of a figure. Regions whose ruled mesh fails its checks become ratio fields, and
-/// those without a skeleton distance profiles; remarks say which and why.
-pub(super) fn raise(
-    figure: &Figure,
-    layer: &LayerSpec,
-    method: Method<'_>,
-    grid: &Grid,
-    tolerance: &Tolerance,
-    remarks: &mut Vec<Remark>,
-) -> Surface {
-    let raised: Vec<(Surface, Vec<Remark>)> = figure
-        .regions
-        .par_iter()
-        .with_max_len(1)
-        .map(|region| {
-            let mut remarks = Vec::new();
-            let part = Part { region, layer, method, grid, tolerance };
-            (part.raise(&mut remarks), remarks)
-        })
-        .collect();
-    if layer.height_mm < layer.base_mm {
-        remarks.push(Remark::RidgeBelowBase);
-    }
-    let mut parts = Vec::with_capacity(raised.len());
-    for (surface, more) in raised {
-        parts.push(surface);
-        remarks.extend(more);
-    }
-    if parts.len() == 1 { parts.swap_remove(0) } else { Surface::Parts(parts) }
-}
-
-/// One region and all that its surface depends on.
-struct Part<'a> {
-    region: &'a Region,
-    layer: &'a LayerSpec,
-    method: Method<'a>,
-    grid: &'a Grid,
-    tolerance: &'a Tolerance,
-}
-
-impl Part<'_> {
-    fn raise(&self, remarks: &mut Vec<Remark>) -> Surface {
-        let Self { region, layer, method, grid, tolerance } = *self;
-        let window = Window::around(grid, &region.bounds());
-        let segments = Segments::of_rings(region.rings());
-        let inscribed = inscribed_radius(region, &segments, profile::RADIUS_CELLS * grid.pitch_mm);
-        let narrow = profile::narrowness(region, inscribed, grid, remarks);
-        if window.is_empty() || inscribed <= 0.0 {
-            return Surface::Field(Patch::empty(window));
-        }
-        let cell = if narrow { grid.pitch_mm / FINE as f64 } else { grid.pitch_mm };
-        let fineness = Fineness::of(cell, tolerance.chord_mm);
-        let at = region.bounds().center();
-        let skeleton = match Skeleton::of(region, &method.crest.skeleton, &fineness) {
-            Ok(skeleton) => skeleton,
-            Err(why) => {
-                remarks.push(Remark::NoSkeleton { at, why });
-                let flank = Flank::of(layer, method.crest.profile, None);
-                let figure = Figure { source: String::new(), regions: vec![region.clone()] };
-                return Surface::Field(profile::raise(&figure, &flank, grid, &mut Vec::new()));
-            }
-        };
-        let ridge = ridge_of(layer, method.crest, region.holes.len() + 1);
-        let heights = ridge.heights(&skeleton.spine);
-        self.remark_cap(&heights, remarks);
-        if !method.ratio {
-            match skeleton.mesh(&heights, &ridge, &fineness) {
-                Ok(mesh) if narrow => return Surface::Fine(mesh),
-                Ok(mesh) => return Surface::Mesh(mesh),
-                Err(why) => remarks.push(Remark::FellBack { at, why }),
-            }
-        }
-        let draw = |grid: &Grid, window: &Window| {
-            ratio::field(region, &skeleton.spine, &heights, &ridge, grid, window)
-        };
-        // The heights of the field hang together over the whole region: it is drawn at once or, where
-        // that would be too much, not averaged.
-        let mut patch = if narrow && window.len() <= MOST_AVERAGED {
-            averaged(grid, &window, window.ny, draw)
-        } else {
-            draw(grid, &window)
-        };
-        lower_walls(&mut patch, std::slice::from_ref(region), layer, method.crest, grid);
-        Surface::Field(patch)
-    }
-
-    /// Says so when the slope cap keeps even the highest place of the crest down.
-    fn remark_cap(&self, heights: &Heights, remarks: &mut Vec<Remark>) {
-        let points = heights.branches.iter().flatten().chain(&heights.nodes);
-        let height_mm = points.fold(f64::NEG_INFINITY, |a, &b| a.max(b));
-        let free = self.method.crest.width_power == 0.0 && self.method.crest.along.is_empty();
-        if free && self.layer.height_mm - height_mm > profile::TOLD_MM {
-            remarks.push(Remark::Capped { height_mm });
-        }
-    }
-}
-
-impl Skeleton {
-    /// The ruled mesh, checked.
-    ///
-    /// # Errors
-    /// Which check failed, and where: the caller takes the ratio field instead.
-    pub fn mesh(
-        &self,
+impl Crest {
+    /// Sorts the heights of the spine by cell. What the spine does not tell is `ridge.height_mm`.
+    pub(super) fn new(
+        sampled: &Sampled,
+        cells: &Cells,
+        rungs: &[Rungs],
+        spine: &Spine,
         heights: &Heights,
         ridge: &Ridge,
-        fineness: &Fineness,
-    ) -> Result<super::Mesh, ruled::RuledFault> {
-        if !self.upright {
-            let at = self.sampled.points.first().copied().unwrap_or(DVec2::ZERO);
-            return Err(ruled::RuledFault::Rungs { at });
+    ) -> Self {
+        let level = ridge.height_mm;
+        let mut crest = Self {
+            caps: vec![level; cells.caps.len()],
+            junctions: vec![level; cells.junctions.len()],
+            hubs: vec![level; cells.hubs.len()],
+            runs: rungs.iter().map(|r| vec![level; r.left.len()]).collect(),
+            sides: BTreeMap::new(),
+        };
+        crest.take_nodes(spine, heights);
+        for (branch, heights) in spine.branches.iter().zip(&heights.branches) {
+            if let Some(run) = branch.run
+                && let Some(line) = crest.runs.get_mut(run.run as usize)
+            {
+                of_line(run, heights, line);
+            }
         }
-        let density =
-            ruled::Density { spacing_mm: fineness.spacing_mm, max_facet_mm: fineness.max_facet_mm };
-        let Self { sampled, cells, rungs, spine, .. } = self;
-        let mesh = ruled::mesh(sampled, cells, rungs, spine, heights, ridge, &density);
-        ruled::check(&mesh, sampled, ridge)?;
-        Ok(mesh)
+        // Whoever comes first says the height of an edge: caps, then runs, then junctions.
+        for (cap, &height) in cells.caps.iter().zip(&crest.caps).filter(|(cap, _)| !cap.closed) {
+            if let (Some(&first), Some(&last)) = (cap.chain.first(), cap.chain.last()) {
+                crest.sides.entry(key(first, last)).or_insert(height);
+            }
+        }
+        for (run, line) in cells.runs.iter().zip(&mut crest.runs).filter(|(run, _)| !run.closed) {
+            if let (Some(&[a, b]), Some(height)) = (run.edges.first(), line.first_mut()) {
+                *height = *crest.sides.entry(key(a, b)).or_insert(*height);
+            }
+            if let (Some(&[a, b]), Some(height)) = (run.edges.last(), line.last_mut()) {
+                *height = *crest.sides.entry(key(a, b)).or_insert(*height);
+            }
+        }
+        crest.take_spokes(sampled, cells, spine, heights);
+        crest
+    }
+
+    /// The height at the midpoint of the inner edge between two vertices, mm.
+    pub(super) fn side(&self, a: u32, b: u32) -> Option<f64> {
+        self.sides.get(&key(a, b)).copied()
+    }
+
+    fn take_nodes(&mut self, spine: &Spine, heights: &Heights) {
+        for (node, &height) in spine.nodes.iter().zip(&heights.nodes) {
+            let (of, k) = match node.kind {
+                NodeKind::Pole(k) => (&mut self.caps, k),
+                NodeKind::Junction(k) => (&mut self.junctions, k),
+                NodeKind::Hub(k) => (&mut self.hubs, k),
+            };
+            if let Some(at) = of.get_mut(k as usize) {
+                *at = height;
+            }
+        }
+    }
+
+    /// Heights at the sides between two junctions: those of the spine's points next to their centres.
+    fn take_spokes(&mut self, sampled: &Sampled, cells: &Cells, spine: &Spine, heights: &Heights) {
+        let mut spokes: Vec<Vec<(DVec2, f64)>> = vec![Vec::new(); spine.nodes.len()];
+        for (branch, heights) in spine.branches.iter().zip(&heights.branches) {
+            let Some([from, to]) = branch.ends else { continue };
+            let n = branch.points.len().min(heights.len());
+            for (node, next) in [(from, 1), (to, n.wrapping_sub(2))] {
+                if let Some(spokes) = spokes.get_mut(node as usize)
+                    && next < n
+                {
+                    spokes.push((branch.points[next].at, heights[next]));
+                }
+            }
+        }
+        for (node, spokes) in spine.nodes.iter().zip(&spokes) {
+            let sides: Vec<[u32; 2]> = match node.kind {
+                NodeKind::Junction(k) => cells.junctions.get(k as usize).map_or(vec![], |j| {
+                    let n = j.poly.len();
+                    (0..n).map(|i| [j.poly[i], j.poly[(i + 1) % n]]).collect()
+                }),
+                NodeKind::Hub(k) => cells.hubs.get(k as usize).map_or(vec![], |hub| {
+                    let ends = [hub.chain.last(), hub.chain.first()];
+                    ends.into_iter().flatten().map(|&v| [v, hub.apex]).collect()
+                }),
+                NodeKind::Pole(_) => vec![],
+            };
+            for [a, b] in sides {
+                let middle = (sampled.at(a) + sampled.at(b)) * 0.5;
+                let away = |p: &&(DVec2, f64)| p.0.distance_squared(middle);
+                let nearest = spokes.iter().min_by(|p, q| away(p).total_cmp(&away(q)));
+                if let Some(&(_, height)) = nearest {
+                    self.sides.entry(key(a, b)).or_insert(height);
+                }
+            }
+        }
     }
 }
 
-/// Lowers a surface whose outline lies at its base to walls with the layer's draft: `b` becomes
-/// `min(b, d / tan(draft))` at distance d inside the outline. Upright walls stay as they are.
-pub fn lower_walls(
-    patch: &mut Patch,
-    regions: &[Region],
-    layer: &LayerSpec,
-    crest: &CrestSpec,
-    grid: &Grid,
-) {
-    let draft = libm::tan(layer.draft_rad);
-    if draft <= 0.0 {
-        return;
+/// The heights of a branch at the points of the run in it, in the order of the run's walk.
+fn of_line(run: RunInBranch, heights: &[f64], line: &mut [f64]) {
+    let (first, last) = (run.first as usize, line.len().saturating_sub(1));
+    for (k, at) in line.iter_mut().enumerate() {
+        let k = if run.reversed { first + last - k } else { first + k };
+        if let Some(&height) = heights.get(k) {
+            *at = height;
+        }
     }
-    let window = patch.window();
-    let mut by = vec![0.0_f32; patch.z.len()];
-    let rings = regions.iter().flat_map(|region| {
-        let base = ridge_of(layer, crest, region.holes.len() + 1).base_mm;
-        region.rings().zip(base).collect::<Vec<_>>()
-    });
-    for (ring, base_mm) in rings.filter(|(_, base)| *base > 0.0) {
-        let mut lower: Vec<f32> =
-            patch.z.iter().map(|z| if z.is_nan() { 0.0 } else { f32::NAN }).collect();
-        let segments = Segments::of_rings([ring]);
-        let depth = |d: f64| (base_mm - d / draft).max(0.0) as f32;
-        segments.fill(grid, &window, base_mm * draft, &mut lower, f32::is_nan, depth);
-        // Beyond the reach of the wall nothing was filled in.
-        by.iter_mut().zip(lower).for_each(|(by, lower)| *by = by.max(lower));
-    }
-    patch.z.iter_mut().zip(by).for_each(|(z, by)| *z -= by);
 }
