@@ -31,3 +31,7 @@ pub fn midlines(sampled: &Sampled, cells: &Cells) -> Vec<Vec<SpinePoint>> {
     };
     cells.runs.iter().map(line).collect()
 }
+
+#[cfg(test)]
+#[path = "cells_tests.rs"]
+mod tests;

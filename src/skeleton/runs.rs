@@ -38,7 +38,7 @@ pub(super) fn runs(sampled: &Sampled, sleeves: &[Sleeve]) -> Vec<Run> {
         if !done[s] {
             let [a, b] = inner_edges(&sleeves[s]);
             let key = |e: [u32; 2]| (e[0].min(e[1]), e[0].max(e[1]));
-            let entry = if key(a) < key(b) { a } else { b };
+            let entry = if key(a) < key(b) { b } else { a };
             runs.push(walk.run(sampled, entry, s, &mut done));
         }
     }
