@@ -354,3 +354,6 @@ fn tell(layer: &LayerSpec, remarks: &[(&str, Remark)], pitch_mm: f64, notes: &mu
         ));
     }
 }
+
+#[cfg(test)]
+mod figures_tests;
