@@ -7,17 +7,18 @@
 mod crest;
 mod crested;
 mod distance;
+mod harmonic;
 mod inscribed;
 mod inside;
 mod kite;
 mod mesh;
-mod weld;
 mod patch;
 mod profile;
 mod ratio;
 mod ridge;
 mod ruled;
 mod rungs;
+mod weld;
 
 pub use crested::{Fineness, Skeleton, lower_walls, ridge_of};
 pub use distance::Segments;
@@ -26,7 +27,7 @@ pub use inside::inside_spans;
 pub use mesh::{Mesh, MeshError};
 pub use patch::{FINE, FINE_ROWS, Patch, Window, averaged};
 pub use profile::{capped_height, outline_height, profile_at, smooth_cap};
-pub use ratio::field as ratio_field;
+pub use ratio::{field as ratio_field, field_finely as ratio_field_finely};
 pub use ridge::{Heights, Ridge};
 pub use ruled::{Density, RuledFault, check as check_ruled, mesh as ruled_mesh};
 pub use rungs::{Rungs, rungs};

@@ -8,9 +8,7 @@
 use super::profile::{self, Flank};
 use super::ridge::{Heights, Ridge};
 use super::rungs::{Rungs, rungs};
-use super::{
-    FINE, Patch, Remark, Segments, Surface, Window, averaged, inscribed_radius, ratio, ruled,
-};
+use super::{FINE, Patch, Remark, Segments, Surface, Window, inscribed_radius, ratio, ruled};
 use crate::geom::{DVec2, Grid, Tolerance};
 use crate::job::{CrestSpec, LayerSpec, SkeletonSpec};
 use crate::outline::{Figure, Region};
@@ -24,8 +22,6 @@ use rayon::prelude::*;
 const FACET_PER_CHORD: f64 = 0.05;
 /// Shortest edge of the resampled outline, in cells.
 const LEAST_EDGE_CELLS: f64 = 2.0;
-/// Nodes of the window of a narrow region whose ratio field is averaged over a finer grid.
-const MOST_AVERAGED: usize = 1 << 21;
 /// Rounds of smoothing for a spine that no rungs carry.
 const SMOOTH_ROUNDS: usize = 2;
 
@@ -194,16 +190,8 @@ impl Part<'_> {
                 Err(why) => remarks.push(Remark::FellBack { at, why }),
             }
         }
-        let draw = |grid: &Grid, window: &Window| {
-            ratio::field(region, &skeleton.spine, &heights, &ridge, grid, window)
-        };
-        // The heights of the field hang together over the whole region: it is drawn at once or, where
-        // that would be too much, not averaged.
-        let mut patch = if narrow && window.len() <= MOST_AVERAGED {
-            averaged(grid, &window, window.ny, draw)
-        } else {
-            draw(grid, &window)
-        };
+        let draw = if narrow { ratio::field_finely } else { ratio::field };
+        let mut patch = draw(region, &skeleton.spine, &heights, &ridge, grid, &window);
         lower_walls(&mut patch, std::slice::from_ref(region), layer, method.crest, grid);
         Surface::Field(patch)
     }

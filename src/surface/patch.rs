@@ -1,8 +1,6 @@
 //! Heights on windows of the grid, and their averages over finer grids.
 
-use super::inside_spans;
 use crate::geom::{Bounds, DVec2, Grid};
-use crate::outline::Region;
 use rayon::prelude::*;
 
 /// Samples along each side of a cell in figures too narrow for the grid.
@@ -102,16 +100,6 @@ impl Patch {
         Window { i0: self.i0, j0: self.j0, nx: self.nx, ny: self.ny }
     }
 
-    /// Sets the heights at all nodes inside the region to 0; the others stay.
-    pub(super) fn mark_inside(&mut self, region: &Region, grid: &Grid) {
-        let rows = inside_spans(region.rings(), grid, &self.window());
-        for (z, spans) in self.z.chunks_exact_mut(self.nx.max(1)).zip(rows) {
-            for (first, end) in spans {
-                z[first as usize..end as usize].fill(0.0);
-            }
-        }
-    }
-
     /// The patches as one: the highest of their heights at every node.
     #[must_use]
     pub fn highest(mut parts: Vec<Self>) -> Self {
@@ -140,7 +128,7 @@ impl Patch {
 }
 
 /// A patch over `window` whose nodes get the mean of [`FINE`] x [`FINE`] samples of their cells, drawn by
-/// `draw` on a finer grid, `rows` rows of cells at a time. Samples that are NaN do not count; a node
+/// `draw` on a finer grid, `rows` rows of the grid at a time. Samples that are NaN do not count; a node
 /// without any stays NaN.
 pub fn averaged(
     grid: &Grid,

@@ -11,7 +11,7 @@
 //! With R left out it is the largest inscribed radius of each region, so that every region has a ridge
 //! of its own height H' and no flat top. Where d < R on the medial axis the surface has a crease.
 
-use super::{FINE_ROWS, Patch, Remark, Segments, Window, averaged, inscribed_radius};
+use super::{FINE_ROWS, Patch, Remark, Segments, Window, averaged, inscribed_radius, inside_spans};
 use crate::geom::Grid;
 use crate::job::{LayerSpec, Profile};
 use crate::outline::{Figure, Region};
@@ -169,11 +169,29 @@ fn raise_region(region: &Region, flank: &Flank, grid: &Grid, remarks: &mut Vec<R
     let height = |d: f64| flank.at(d, ridge, radius) as f32;
     let draw = |grid: &Grid, window: &Window| {
         let mut patch = Patch::empty(*window);
-        patch.mark_inside(region, grid);
-        segments.fill(grid, window, f64::INFINITY, &mut patch.z, |z| !z.is_nan(), height);
+        sample(region, &segments, grid, window, height, &mut patch.z);
         patch
     };
     if narrow { averaged(grid, &window, FINE_ROWS, draw) } else { draw(grid, &window) }
+}
+
+/// Heights by the distance to the segments at the nodes of the window that lie inside the region; the
+/// others stay NaN.
+pub(super) fn sample(
+    region: &Region,
+    segments: &Segments,
+    grid: &Grid,
+    window: &Window,
+    height: impl Fn(f64) -> f32 + Sync,
+    z: &mut [f32],
+) {
+    let rows = inside_spans(region.rings(), grid, window);
+    for (z, spans) in z.chunks_exact_mut(window.nx).zip(rows) {
+        for (first, end) in spans {
+            z[first as usize..end as usize].fill(0.0);
+        }
+    }
+    segments.fill(grid, window, f64::INFINITY, z, |z| !z.is_nan(), height);
 }
 
 #[cfg(test)]
