@@ -168,7 +168,7 @@ fn the_poles_of_a_rectangle_lie_where_a_disc_fits() {
 fn in_a_star_all_sleeves_pair_and_the_spine_lies_on_the_axes() {
     let tips = 10;
     let tip = |k: usize| {
-        let r = if k % 2 == 0 { 5.0 } else { 1.909830 };
+        let r = if k.is_multiple_of(2) { 5.0 } else { 1.909830 };
         DVec2::from_angle(TAU * (0.25 + k as f64 / tips as f64)) * r
     };
     let mut ring = Vec::new();

@@ -40,7 +40,9 @@ pub(super) fn merge(sampled: &Sampled, triangles: &[[u32; 3]], join: Join) -> Ve
             polygons[left] = merged;
             polygons[right].clear();
             let moved = std::mem::take(&mut members[right]);
-            moved.iter().for_each(|&t| of[t] = left);
+            for &t in &moved {
+                of[t] = left;
+            }
             members[left].extend(moved);
         }
     }

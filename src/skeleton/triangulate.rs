@@ -7,6 +7,9 @@ use std::collections::VecDeque;
 /// In [`Triangulation::neighbours`]: the edge lies on the outline.
 pub const NO_TRIANGLE: u32 = u32::MAX;
 
+/// Mark of a face that the flood has not reached; others are 0 (outside) or 1 (inside).
+const UNSEEN: u8 = 2;
+
 /// The triangles inside a region, constrained by its edges; no vertex is added.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Triangulation {
@@ -89,7 +92,6 @@ pub fn triangulate(sampled: &Sampled) -> Result<Triangulation, SkeletonError> {
     }
 
     // Flood from just inside the hull: crossing a constraint toggles inside and outside.
-    const UNSEEN: u8 = 2;
     let mut inside = vec![UNSEEN; cdt.num_all_faces()];
     let mut queue = VecDeque::new();
     for edge in cdt.convex_hull() {

@@ -11,16 +11,16 @@ fn brute(h: &[f32], nx: usize) -> Vec<f64> {
             let (i, j) = (k % nx, k / nx);
             let mut near = Vec::new();
             if i > 0 {
-                near.push(k - 1)
+                near.push(k - 1);
             }
             if i + 1 < nx {
-                near.push(k + 1)
+                near.push(k + 1);
             }
             if j > 0 {
-                near.push(k - nx)
+                near.push(k - nx);
             }
             if k + nx < h.len() {
-                near.push(k + nx)
+                near.push(k + nx);
             }
             near.retain(|&k| !h[k].is_nan());
             let mean = near.iter().map(|&k| x[k]).sum::<f64>() / near.len() as f64;
@@ -88,15 +88,16 @@ fn nothing_known_and_nothing_free() {
 #[test]
 fn hard_figures_are_those_of_brute_force() {
     let n = 60;
-    let shapes: [(&str, &dyn Fn(usize, usize) -> f32); 4] = [
+    type Shape<'a> = &'a dyn Fn(usize, usize) -> f32;
+    let shapes: [(&str, Shape); 4] = [
         ("comb with dead ends", &|x, y| match (x % 6, y) {
             (0, 9..) => f32::NAN,
-            (_, 5) => (x as f32 / 20.0).sin(),
+            (_, 5) => libm::sinf(x as f32 / 20.0),
             _ => FREE,
         }),
         ("comb with a spine in each tooth", &|x, y| match (x % 9, y) {
             (0, 12..) => f32::NAN,
-            (_, 6) | (4, 6..53) => (x as f32 / 9.0 + y as f32 / 17.0).sin(),
+            (_, 6) | (4, 6..53) => libm::sinf(x as f32 / 9.0 + y as f32 / 17.0),
             _ => FREE,
         }),
         ("two points", &|x, y| match (x, y) {

@@ -153,12 +153,13 @@ impl Crest {
         for (branch, h) in spine.branches.iter().zip(&heights.branches) {
             let mut points: Vec<DVec2> = branch.points.iter().map(|p| p.at).collect();
             let mut h = h.clone();
-            match branch.ends {
-                Some(ends) => ends.iter().for_each(|&node| lone[node as usize] = false),
-                None => {
-                    points.extend(points.first().copied());
-                    h.extend(h.first().copied());
+            if let Some(ends) = branch.ends {
+                for node in ends {
+                    lone[node as usize] = false;
                 }
+            } else {
+                points.extend(points.first().copied());
+                h.extend(h.first().copied());
             }
             lines.push((points, h));
         }
@@ -183,7 +184,9 @@ impl Crest {
     fn spread(&self, rows: &[Vec<(u32, u32)>], grid: &Grid, window: &Window) -> Vec<f32> {
         let mut h = vec![f32::NAN; window.len()];
         for (h, runs) in h.chunks_exact_mut(window.nx).zip(rows) {
-            runs.iter().for_each(|&(first, end)| h[first as usize..end as usize].fill(FREE));
+            for &(first, end) in runs {
+                h[first as usize..end as usize].fill(FREE);
+            }
         }
         let mut near: Vec<(usize, f64, f64)> = Vec::new();
         for piece in self.pieces() {
@@ -193,7 +196,9 @@ impl Crest {
         near.retain(|&(k, ..)| h[k] == FREE);
         near.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
         near.dedup_by_key(|entry| entry.0);
-        near.iter().for_each(|&(k, _, height)| h[k] = height as f32);
+        for &(k, _, height) in &near {
+            h[k] = height as f32;
+        }
         self.settle_lone_parts(rows, grid, window, &mut h);
         harmonic::spread(&mut h, window.nx);
         h

@@ -268,7 +268,7 @@ fn narrow_parts_are_means_of_finer_samples() {
                 seen += 1;
                 assert!((z - sum / n).abs() < 1e-3, "{i} {j}: {z} {}", sum / n);
             } else {
-                assert!(z >= 0.0 && z <= 3.0);
+                assert!((0.0..=3.0).contains(&z));
             }
         }
     }

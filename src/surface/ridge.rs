@@ -63,7 +63,7 @@ impl Ridge {
             widths.chain(spine.branches.iter().flat_map(|b| b.points.iter().map(|p| p.half_width)));
         let w_max = widths.fold(0.0, f64::max);
         let cubic = Monotone::new(&self.along);
-        let met = self.met(spine, &cubic);
+        let met = Self::met(spine, &cubic);
         let nodes: Vec<f64> = (spine.nodes.iter().zip(&met))
             .map(|(node, &factor)| self.height(&node.point, w_max, factor))
             .collect();
@@ -83,7 +83,7 @@ impl Ridge {
     }
 
     /// The multiplier at each node: the mean of those of the branches that end there.
-    fn met(&self, spine: &Spine, cubic: &Monotone) -> Vec<f64> {
+    fn met(spine: &Spine, cubic: &Monotone) -> Vec<f64> {
         let mut sums = vec![(0.0, 0_u32); spine.nodes.len()];
         for [start, end] in spine.branches.iter().filter_map(|b| b.ends) {
             for (node, factor) in [(start, cubic.at(0.0)), (end, cubic.at(1.0))] {

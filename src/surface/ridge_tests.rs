@@ -196,7 +196,9 @@ proptest! {
         let mut spine = straight(&widths);
         let end = spine.nodes[1].point;
         let mut turn: Vec<SpinePoint> = (0..5).map(|k| point(f64::from(k), 4.0, widths[1])).collect();
-        turn.iter_mut().for_each(|p| p.rings = [0, 1]);
+        for p in &mut turn {
+            p.rings = [0, 1];
+        }
         (turn[0], turn[4]) = (end, end);
         spine.branches.push(branch(turn, Some([1, 1])));
         let heights = ridge.heights(&spine);

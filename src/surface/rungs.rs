@@ -145,6 +145,9 @@ struct Ladder<'a> {
     knots: Vec<[f64; 2]>,
 }
 
+/// A place on the dense grid where a rung must stand, and the walked length and place of its exact feet.
+type Break = (f64, [Option<(f64, f64)>; 2]);
+
 /// Where a rung stands on an outline.
 #[derive(Clone, Copy)]
 struct Foot {
@@ -230,7 +233,7 @@ impl<'a> Ladder<'a> {
             along[i + 1] = along[i] + step;
         }
         // Break points: (place on the dense grid, exact feet).
-        let mut breaks: Vec<(f64, [Option<(f64, f64)>; 2])> = Vec::new();
+        let mut breaks: Vec<Break> = Vec::new();
         let ends = |k: usize, at_end: bool| {
             let side = &self.sides[k];
             let exact = if at_end { (side.total, side.end) } else { (0.0, side.start) };
@@ -257,9 +260,9 @@ impl<'a> Ladder<'a> {
                 } else {
                     place_of(&along, from + (to - from) * (part as f64 / parts))
                 };
-                for k in 0..2 {
+                for (k, feet) in feet.iter_mut().enumerate() {
                     let exact = pair[0].1[k].filter(|_| first);
-                    feet[k].push(match exact {
+                    feet.push(match exact {
                         Some((t, place)) => Foot { t, place: Some(place) },
                         None => Foot { t: value_at(&dense.t[k], x), place: None },
                     });
@@ -267,11 +270,13 @@ impl<'a> Ladder<'a> {
             }
         }
         if let (false, Some(last)) = (self.closed, breaks.last()) {
-            for k in 0..2 {
-                feet[k].extend(last.1[k].map(|(t, place)| Foot { t, place: Some(place) }));
+            for (k, feet) in feet.iter_mut().enumerate() {
+                feet.extend(last.1[k].map(|(t, place)| Foot { t, place: Some(place) }));
             }
         }
-        feet.iter_mut().for_each(|feet| weld(feet, WELD * self.spacing));
+        for feet in &mut feet {
+            weld(feet, WELD * self.spacing);
+        }
         feet
     }
 }
@@ -366,10 +371,14 @@ impl<'a> Dense<'a> {
         if self.ladder.closed {
             let end = t[0] + total;
             rise(t);
-            t.iter_mut().for_each(|t| *t = t.min(end));
+            for t in t.iter_mut() {
+                *t = t.min(end);
+            }
             t[n] = end;
         } else {
-            t.iter_mut().for_each(|t| *t = t.clamp(0.0, total));
+            for t in t.iter_mut() {
+                *t = t.clamp(0.0, total);
+            }
             t[0] = 0.0;
             t[n] = total;
             rise(t);
