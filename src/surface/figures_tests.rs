@@ -147,3 +147,75 @@ fn an_annulus_has_even_rungs_and_the_exact_height() {
     let max = errors.iter().fold(0.0_f64, |a, e| a.max(e.abs()));
     assert!(rms < 0.0009 && max < 0.0015, "{rms} {max}");
 }
+
+/// Numbers in 0..1 from a fixed seed.
+struct Noise(u64);
+
+impl Noise {
+    fn next(&mut self) -> f64 {
+        self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        (self.0 >> 11) as f64 / (1_u64 << 53) as f64
+    }
+}
+
+/// A random blob by Fourier waves; every third with a hole.
+fn blob(k: u32, noise: &mut Noise) -> crate::outline::Region {
+    let waves: Vec<[f64; 2]> =
+        (2..8).map(|m| [0.9 * noise.next() / f64::from(m), TAU * noise.next()]).collect();
+    let radius = |a: f64| {
+        let wave = waves
+            .iter()
+            .zip(2..)
+            .map(|([size, phase], m)| 0.4 * size * libm::cos(f64::from(m) * a + phase));
+        4.0 * (1.0 + wave.sum::<f64>()).max(0.15)
+    };
+    let ring = |scale: f64| -> Ring {
+        (0..400)
+            .map(|i| TAU * f64::from(i) / 400.0)
+            .map(|a| DVec2::from_angle(a) * (scale * radius(a)))
+            .collect()
+    };
+    let mut hole = ring(0.2 + 0.3 * noise.next());
+    hole.reverse();
+    let holes = if k.is_multiple_of(3) { vec![hole] } else { vec![] };
+    crate::outline::Region { outer: ring(1.0), holes }
+}
+
+#[test]
+fn random_outlines_get_sound_meshes_at_three_densities() {
+    // 300 outlines with RELIEVO_SURFACES=full, else 60; at most one in a hundred may fail its checks.
+    let full = std::env::var("RELIEVO_SURFACES").is_ok_and(|v| v == "full");
+    let count = if full { 300 } else { 60 };
+    for part in [1.0, 0.6, 0.3] {
+        let mut noise = Noise(12345);
+        let mut failed = Vec::new();
+        for k in 0..count {
+            let region = blob(k, &mut noise);
+            let around: f64 = region.rings().map(crate::geom::perimeter).sum();
+            let edge = part * region.area() / around;
+            let spec = SkeletonSpec { edge_mm: Some(edge), ..SkeletonSpec::default() };
+            let fineness = Fineness {
+                chord_mm: 0.02,
+                spacing_mm: 0.1,
+                least_edge_mm: 0.02,
+                max_facet_mm: 1e-3,
+            };
+            let skeleton = Skeleton::of(&region, &spec, &fineness).unwrap();
+            let ridge = Ridge {
+                height_mm: 1.0,
+                base_mm: vec![0.0; region.holes.len() + 1],
+                profile: Profile::Parabola,
+                slope_cap: 4.0,
+                width_power: 0.0,
+                along: vec![],
+            };
+            let heights = ridge.heights(&skeleton.spine);
+            match skeleton.mesh(&heights, &ridge, &fineness) {
+                Ok(mesh) => mesh.check().unwrap(),
+                Err(why) => failed.push(format!("{k}: {why}")),
+            }
+        }
+        println!("{part}: {} of {count} failed", failed.len());
+        assert!(failed.len() as u32 * 100 <= count, "{part}: {failed:?}");
+    }
+}

@@ -39,6 +39,9 @@ fn worst(h: &[f32], exact: &[f64]) -> f64 {
     h.iter().zip(exact).map(off).fold(0.0, f64::max)
 }
 
+/// Fixed heights by node: NaN or free where none is fixed.
+type Shape<'a> = &'a dyn Fn(usize, usize) -> f32;
+
 #[test]
 fn a_straight_slope_stays_straight() {
     let (nx, ny) = (301, 97);
@@ -88,7 +91,6 @@ fn nothing_known_and_nothing_free() {
 #[test]
 fn hard_figures_are_those_of_brute_force() {
     let n = 60;
-    type Shape<'a> = &'a dyn Fn(usize, usize) -> f32;
     let shapes: [(&str, Shape); 4] = [
         ("comb with dead ends", &|x, y| match (x % 6, y) {
             (0, 9..) => f32::NAN,
