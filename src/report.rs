@@ -24,6 +24,7 @@ mod paths;
 mod plane;
 mod scale;
 mod shade;
+mod skeleton;
 mod stl;
 mod strokes;
 mod summary;
@@ -36,6 +37,7 @@ pub use deviation::{DeviationScale, deviation_png};
 pub use html::html;
 pub use paths::paths_png;
 pub use shade::{Look, shaded_png};
+pub use skeleton::skeleton_svg;
 pub use stl::{stl, stl_every_nth_node};
 pub use summary::summary;
 

@@ -3,10 +3,15 @@
 use super::files::{self, Outputs};
 use super::observe::{self, Stages};
 use super::{Stop, inputs, memory, outcome};
-use crate::carve;
+use crate::job::SurfaceSpec;
+use crate::outline::Region;
+use crate::report::skeleton_svg;
+use crate::surface::{Fineness, Skeleton};
+use crate::{Design, carve};
 use std::path::{Path, PathBuf};
 
 #[derive(Debug, clap::Args)]
+#[allow(clippy::struct_excessive_bools, reason = "each is a flag of the command line")]
 #[command(
     after_help = "Examples:\n  relievo carve rose.svg                 good defaults, outputs in rose-carving/\n  \
                         relievo carve rose.toml --timings      a job file, and how long each stage took"
@@ -22,6 +27,11 @@ pub(super) struct Args {
     /// Print how long each stage took
     #[arg(long)]
     timings: bool,
+
+    /// Also write skeleton-1.svg, skeleton-2.svg, ... : for each layer with a crest the triangles, the
+    /// rungs and the spine that its surface was made from
+    #[arg(long)]
+    debug_pictures: bool,
 
     /// Print the result as JSON
     #[arg(long)]
@@ -48,6 +58,11 @@ pub(super) fn run(args: &Args) -> Result<(), Stop> {
     stages.enter("pictures");
     let again = files::name_from(&folder, &input.artwork_file)?;
     let (data, made) = outcome::outputs(&carving, &again)?;
+    if args.debug_pictures {
+        for (name, svg) in skeletons(&carving.design) {
+            outputs.add(&name, svg.as_bytes())?;
+        }
+    }
     stages.enter("write");
     for (name, bytes) in &made {
         outputs.add(name, bytes)?;
@@ -64,6 +79,25 @@ pub(super) fn run(args: &Args) -> Result<(), Stop> {
         observe::complain(&timings);
     }
     Ok(())
+}
+
+/// The skeletons of the layers whose surfaces have one, as pictures with their names.
+fn skeletons(design: &Design) -> Vec<(String, String)> {
+    let job = &design.job;
+    let fineness = Fineness::of(job.relief.pitch_mm, job.tolerance.chord_mm);
+    let mut pictures = Vec::new();
+    for (k, (layer, outline)) in job.layers.iter().zip(&design.outlines.layers).enumerate() {
+        let (SurfaceSpec::Ruled(crest) | SurfaceSpec::Ratio(crest)) = &layer.surface else {
+            continue;
+        };
+        let regions: Vec<&Region> = outline.figures.iter().flat_map(|f| &f.regions).collect();
+        let parts: Vec<_> = regions
+            .into_iter()
+            .map(|region| (region, Skeleton::of(region, &crest.skeleton, &fineness).ok()))
+            .collect();
+        pictures.push((format!("skeleton-{}.svg", k + 1), skeleton_svg(&layer.name, &parts)));
+    }
+    pictures
 }
 
 /// The resolved job must not take the place of the job that it came from.
