@@ -9,12 +9,14 @@ mod inscribed;
 mod inside;
 mod mesh;
 mod profile;
+mod ridge;
 
 pub use distance::Segments;
 pub use inscribed::inscribed_radius;
 pub use inside::inside_spans;
 pub use mesh::{Mesh, MeshError};
 pub use profile::{capped_height, outline_height, profile_at, smooth_cap};
+pub use ridge::{Heights, Ridge};
 
 use crate::geom::{Bounds, Grid};
 use crate::job::{LayerSpec, SurfaceSpec};
