@@ -5,10 +5,12 @@
 //! Whatever cannot be raised as asked for is told in [`Raised::notes`], never dropped in silence.
 
 mod distance;
+mod harmonic;
 mod inscribed;
 mod inside;
 mod mesh;
 mod profile;
+mod ratio;
 mod ridge;
 
 pub use distance::Segments;
@@ -16,6 +18,7 @@ pub use inscribed::inscribed_radius;
 pub use inside::inside_spans;
 pub use mesh::{Mesh, MeshError};
 pub use profile::{capped_height, outline_height, profile_at, smooth_cap};
+pub use ratio::{field, field_finely};
 pub use ridge::{Heights, Ridge};
 
 use crate::geom::{Bounds, Grid};

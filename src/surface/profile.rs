@@ -185,20 +185,17 @@ fn raise_region(region: &Region, flank: &Flank, grid: &Grid, remarks: &mut Vec<R
         remarks.push(Remark::Capped { height_mm: ridge });
     }
     let height = |d: f64| flank.at(d, ridge, radius) as f32;
-    if narrow {
-        let task = FINE_ROWS * window.nx;
-        patch.z.par_chunks_mut(task).enumerate().for_each(|(k, z)| {
-            let rows = Window { j0: window.j0 + k * FINE_ROWS, ny: z.len() / window.nx, ..window };
-            sample_finely(region, &segments, grid, &rows, height, z);
-        });
-    } else {
-        sample(region, &segments, grid, &window, height, &mut patch.z);
-    }
+    let heights = |grid: &Grid, window: &Window| {
+        let mut z = vec![f32::NAN; window.len()];
+        sample(region, &segments, grid, window, height, &mut z);
+        z
+    };
+    patch.z = if narrow { finely(grid, &window, heights) } else { heights(grid, &window) };
     patch
 }
 
 /// Heights at the nodes of the window that lie inside the region; the others stay NaN.
-fn sample(
+pub(super) fn sample(
     region: &Region,
     segments: &Segments,
     grid: &Grid,
@@ -215,15 +212,13 @@ fn sample(
     segments.fill(grid, window, f64::INFINITY, z, |z| !z.is_nan(), height);
 }
 
-/// The mean height of the samples inside the region within each node's cell.
-fn sample_finely(
-    region: &Region,
-    segments: &Segments,
+/// For each node of the window the mean of the samples in its cell that are numbers; NaN where none is.
+/// `heights` gives the samples, row-major over a window of a grid four times finer; it is asked for bands.
+pub(super) fn finely(
     grid: &Grid,
     window: &Window,
-    height: impl Fn(f64) -> f32 + Sync,
-    z: &mut [f32],
-) {
+    heights: impl Fn(&Grid, &Window) -> Vec<f32> + Sync,
+) -> Vec<f32> {
     // The samples of a cell lie at -3/8, -1/8, 1/8, 3/8 of the pitch from its node.
     let pitch_mm = grid.pitch_mm / FINE as f64;
     let shift = 0.5 * (FINE as f64 - 1.0) * pitch_mm;
@@ -233,20 +228,25 @@ fn sample_finely(
         pitch_mm,
         origin: grid.origin - DVec2::splat(shift),
     };
-    let Window { i0, j0, nx, ny } = *window;
-    let inner = Window { i0: i0 * FINE, j0: j0 * FINE, nx: nx * FINE, ny: ny * FINE };
-    let mut samples = vec![f32::NAN; inner.len()];
-    sample(region, segments, &fine, &inner, height, &mut samples);
-    for (k, z) in z.iter_mut().enumerate() {
-        let (i, j) = (k % nx * FINE, k / nx * FINE);
-        let cell = (j..j + FINE).flat_map(|j| &samples[j * inner.nx + i..j * inner.nx + i + FINE]);
-        let (sum, n) = cell
-            .filter(|s| !s.is_nan())
-            .fold((0.0_f64, 0_u32), |(sum, n), &s| (sum + f64::from(s), n + 1));
-        if n > 0 {
-            *z = (sum / f64::from(n)) as f32;
+    let Window { i0, j0, nx, .. } = *window;
+    let mut z = vec![f32::NAN; window.len()];
+    z.par_chunks_mut((FINE_ROWS * nx).max(1)).enumerate().for_each(|(band, z)| {
+        let (j0, ny) = (j0 + band * FINE_ROWS, z.len() / nx);
+        let inner = Window { i0: i0 * FINE, j0: j0 * FINE, nx: nx * FINE, ny: ny * FINE };
+        let samples = heights(&fine, &inner);
+        for (k, z) in z.iter_mut().enumerate() {
+            let (i, j) = (k % nx * FINE, k / nx * FINE);
+            let cell =
+                (j..j + FINE).flat_map(|j| &samples[j * inner.nx + i..j * inner.nx + i + FINE]);
+            let (sum, n) = cell
+                .filter(|s| !s.is_nan())
+                .fold((0.0_f64, 0_u32), |(sum, n), &s| (sum + f64::from(s), n + 1));
+            if n > 0 {
+                *z = (sum / f64::from(n)) as f32;
+            }
         }
-    }
+    });
+    z
 }
 
 #[cfg(test)]
