@@ -12,6 +12,9 @@ mod kite;
 mod mesh;
 mod profile;
 mod ridge;
+pub mod ruled;
+mod rungs;
+mod weld;
 
 pub use distance::Segments;
 pub use inscribed::inscribed_radius;
@@ -19,6 +22,8 @@ pub use inside::inside_spans;
 pub use mesh::{Mesh, MeshError};
 pub use profile::{capped_height, outline_height, profile_at, smooth_cap};
 pub use ridge::{Heights, Ridge};
+pub use ruled::{Density, RuledFault};
+pub use rungs::Rungs;
 
 use crate::geom::{Bounds, Grid};
 use crate::job::{LayerSpec, SurfaceSpec};
