@@ -446,3 +446,7 @@ fn nearest_ring(sampled: &Sampled, ridge: &Ridge, at: DVec2) -> u32 {
 #[cfg(test)]
 #[path = "ruled_tests.rs"]
 mod tests;
+
+#[cfg(test)]
+#[path = "ruled_whole_tests.rs"]
+mod whole_tests;
