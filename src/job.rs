@@ -23,8 +23,9 @@ pub use draft::Draft;
 pub use error::{Fault, JobError};
 pub use library::{BUILT_IN_FILES, Library};
 pub use types::{
-    ArtworkSpec, Background, Combine, CutterShape, CutterSpec, Fit, Found, FoundLayer, Job,
-    LayerSpec, Machine, Operation, OperationKind, Origin, Place, Profile, ReliefSpec, Rgb,
-    Selector, Stepover, Stock, SurfaceSpec, Wood,
+    ArtworkSpec, Background, Combine, CrestSpec, CutterShape, CutterSpec, Fit, Found, FoundLayer,
+    Job, Join, LayerSpec, Machine, Operation, OperationKind, Origin, Place, Profile, Prune,
+    ReliefSpec, Rgb, Selector, Significance, SkeletonSpec, Split, Stepover, Stock, SurfaceSpec,
+    Wood,
 };
 pub use write::{defaults_table, template};

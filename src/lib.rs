@@ -161,7 +161,7 @@ pub fn design(
     let outlines = outline::trace(&placed, &job.layers, &job.tolerance)?;
     enter("surfaces");
     let grid = relief::grid_of(&job)?;
-    let raised = surface::raise_all(&outlines, &job.layers, &grid)?;
+    let raised = surface::raise_all(&outlines, &job.layers, &grid, &job.tolerance)?;
     enter("merge");
     let raised_notes = raised.notes.clone();
     let relief = relief::merge(&job, &outlines, raised.surfaces, &grid)?;

@@ -16,6 +16,7 @@ mod regions;
 mod trace;
 
 pub use check::RegionFault;
+pub(crate) use check::meeting_edges;
 pub use trace::trace;
 
 use crate::geom::{Bounds, DVec2, Ring, bounds_of, contains_even_odd, signed_area};

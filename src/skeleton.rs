@@ -13,10 +13,19 @@
 //! Vertices are numbered through all rings, the outer one first. The figure lies to the left of every
 //! ring, so an edge of the outline always runs from a vertex to [`Sampled::next`] of it.
 
+mod cells;
 mod curve;
+mod junctions;
+mod prune;
+mod runs;
+mod sample;
+mod spine;
 mod triangulate;
 
+pub use cells::{cells, midlines};
 pub use curve::{Curve, four_point};
+pub use sample::{SampleLimits, resampled, sample};
+pub use spine::{smooth, spine};
 pub use triangulate::{Class, NO_TRIANGLE, Triangulation, triangulate};
 
 use crate::geom::DVec2;

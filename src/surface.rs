@@ -5,128 +5,51 @@
 //! Whatever cannot be raised as asked for is told in [`Raised::notes`], never dropped in silence.
 
 mod crest;
+mod crested;
 mod distance;
+mod harmonic;
 mod inscribed;
 mod inside;
 mod kite;
 mod mesh;
+mod patch;
 mod profile;
+mod ratio;
 mod ridge;
-pub mod ruled;
+mod ruled;
 mod rungs;
 mod weld;
 
+pub use crested::{Fineness, Skeleton, lower_walls, ridge_of};
 pub use distance::Segments;
 pub use inscribed::inscribed_radius;
 pub use inside::inside_spans;
 pub use mesh::{Mesh, MeshError};
+pub use patch::{FINE, FINE_ROWS, Patch, Window, averaged};
 pub use profile::{capped_height, outline_height, profile_at, smooth_cap};
+pub use ratio::{field as ratio_field, field_finely as ratio_field_finely};
 pub use ridge::{Heights, Ridge};
-pub use ruled::{Density, RuledFault};
-pub use rungs::Rungs;
+pub use ruled::{Density, RuledFault, check as check_ruled, mesh as ruled_mesh};
+pub use rungs::{Rungs, rungs};
 
-use crate::geom::{Bounds, Grid};
+use crate::geom::{Bounds, Grid, Tolerance};
 use crate::job::{LayerSpec, SurfaceSpec};
 use crate::outline::{Figure, Outlines};
+use crate::skeleton::SkeletonError;
 use rayon::prelude::*;
-
-/// A rectangular window of a grid's nodes: columns `i0..i0 + nx`, rows `j0..j0 + ny`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Window {
-    /// First column.
-    pub i0: usize,
-    /// First row.
-    pub j0: usize,
-    /// Columns.
-    pub nx: usize,
-    /// Rows.
-    pub ny: usize,
-}
-
-impl Window {
-    /// All nodes of a grid.
-    pub fn whole(grid: &Grid) -> Self {
-        Self { i0: 0, j0: 0, nx: grid.nx, ny: grid.ny }
-    }
-
-    /// The nodes whose cell (the square of one pitch round the node) meets `bounds`; empty (`nx` or
-    /// `ny` = 0) when none does.
-    pub fn around(grid: &Grid, bounds: &Bounds) -> Self {
-        let (lo, hi) = (grid.to_grid(bounds.min), grid.to_grid(bounds.max));
-        // `as usize` clamps at zero, which is what the first node is for.
-        let span = |lo: f64, hi: f64, n: usize| {
-            if !(hi >= -0.5 && lo <= n as f64 - 0.5) {
-                return (0, 0);
-            }
-            let first = (lo - 0.5).floor().max(0.0) as usize;
-            let last = ((hi + 0.5).ceil().max(0.0) as usize).min(n - 1);
-            (first, last + 1 - first)
-        };
-        let ((i0, nx), (j0, ny)) = (span(lo.x, hi.x, grid.nx), span(lo.y, hi.y, grid.ny));
-        if nx == 0 || ny == 0 { Self { i0, j0, nx: 0, ny: 0 } } else { Self { i0, j0, nx, ny } }
-    }
-
-    /// Number of nodes.
-    pub fn len(&self) -> usize {
-        self.nx * self.ny
-    }
-
-    /// True when it holds no node.
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
-    }
-
-    /// The part of it in rows `j0..j1` of the grid.
-    #[must_use]
-    pub fn rows(&self, j0: usize, j1: usize) -> Self {
-        let first = self.j0.max(j0);
-        let end = (self.j0 + self.ny).min(j1).max(first);
-        Self { j0: first, ny: end - first, ..*self }
-    }
-}
-
-/// Heights on a rectangular window of the relief's grid.
-#[derive(Debug, Clone)]
-pub struct Patch {
-    /// First column of the window.
-    pub i0: usize,
-    /// First row of the window.
-    pub j0: usize,
-    /// Columns.
-    pub nx: usize,
-    /// Rows.
-    pub ny: usize,
-    /// Heights, row-major, mm; NaN outside the figure.
-    pub z: Vec<f32>,
-}
-
-impl Patch {
-    /// A patch without a height anywhere.
-    pub fn empty(window: Window) -> Self {
-        let Window { i0, j0, nx, ny } = window;
-        Self { i0, j0, nx, ny, z: vec![f32::NAN; window.len()] }
-    }
-
-    /// The window it covers.
-    pub fn window(&self) -> Window {
-        Window { i0: self.i0, j0: self.j0, nx: self.nx, ny: self.ny }
-    }
-
-    /// Height at node (i, j) of the grid; NaN outside the figure or the window.
-    pub fn at(&self, i: usize, j: usize) -> f32 {
-        let inside =
-            (self.i0..self.i0 + self.nx).contains(&i) && (self.j0..self.j0 + self.ny).contains(&j);
-        if inside { self.z[(j - self.j0) * self.nx + (i - self.i0)] } else { f32::NAN }
-    }
-}
 
 /// The surface of one figure.
 #[derive(Debug, Clone)]
 pub enum Surface {
     /// Triangles, still to be rasterised.
     Mesh(Mesh),
+    /// Triangles of a figure too narrow for the grid: to be sampled [`FINE`] times finer in x and y, the
+    /// node getting the mean of the samples in its cell that the mesh covers.
+    Fine(Mesh),
     /// Heights at the nodes.
     Field(Patch),
+    /// The surfaces of the figure's regions; where they meet, the highest counts.
+    Parts(Vec<Surface>),
 }
 
 /// Why a surface cannot be raised.
@@ -179,6 +102,20 @@ pub enum Remark {
         /// Height of its ridge, mm.
         height_mm: f64,
     },
+    /// Its outline has no skeleton: it got the distance profile.
+    NoSkeleton {
+        /// The middle of its bounding box, mm.
+        at: crate::geom::DVec2,
+        /// Why.
+        why: SkeletonError,
+    },
+    /// Its ruled mesh failed a check: it got the ratio field.
+    FellBack {
+        /// The middle of its bounding box, mm.
+        at: crate::geom::DVec2,
+        /// Why.
+        why: RuledFault,
+    },
     /// The ridge was asked to lie below the outline; it lies level with it.
     RidgeBelowBase,
     /// It reaches past the edge of the stock and is cut off there.
@@ -214,6 +151,7 @@ pub fn raise(
     figure: &Figure,
     layer: &LayerSpec,
     grid: &Grid,
+    tolerance: &Tolerance,
 ) -> Result<RaisedFigure, SurfaceError> {
     check_numbers(figure, layer)?;
     let mut remarks = Vec::new();
@@ -226,13 +164,18 @@ pub fn raise(
     if over > grid.pitch_mm {
         remarks.push(Remark::OverTheEdge { by_mm: over });
     }
-    let (profile, radius_mm) = match &layer.surface {
-        SurfaceSpec::Profile { profile, radius_mm } => (*profile, *radius_mm),
-        // No job can ask for these yet.
-        SurfaceSpec::Ruled(crest) | SurfaceSpec::Ratio(crest) => (crest.profile, None),
+    let mut raise_crest = |crest, ratio| {
+        let method = crested::Method { crest, ratio };
+        crested::raise(figure, layer, method, grid, tolerance, &mut remarks)
     };
-    let flank = profile::Flank::of(layer, profile, radius_mm);
-    let surface = Surface::Field(profile::raise(figure, &flank, grid, &mut remarks));
+    let surface = match &layer.surface {
+        SurfaceSpec::Ruled(crest) => raise_crest(crest, false),
+        SurfaceSpec::Ratio(crest) => raise_crest(crest, true),
+        SurfaceSpec::Profile { profile, radius_mm } => {
+            let flank = profile::Flank::of(layer, *profile, *radius_mm);
+            Surface::Field(profile::raise(figure, &flank, grid, &mut remarks))
+        }
+    };
     Ok(RaisedFigure { surface, remarks })
 }
 
@@ -245,6 +188,7 @@ pub fn raise_all(
     outlines: &Outlines,
     layers: &[LayerSpec],
     grid: &Grid,
+    tolerance: &Tolerance,
 ) -> Result<Raised, SurfaceError> {
     let figures: Vec<(usize, &Figure)> = (outlines.layers.iter().enumerate().take(layers.len()))
         .flat_map(|(l, layer)| layer.figures.iter().map(move |figure| (l, figure)))
@@ -252,7 +196,7 @@ pub fn raise_all(
     let raised: Vec<Result<RaisedFigure, SurfaceError>> = figures
         .par_iter()
         .with_max_len(1)
-        .map(|&(l, figure)| raise(figure, &layers[l], grid))
+        .map(|&(l, figure)| raise(figure, &layers[l], grid, tolerance))
         .collect();
     let mut surfaces: Vec<Vec<Surface>> = layers.iter().map(|_| Vec::new()).collect();
     let mut remarks: Vec<Vec<(&str, Remark)>> = layers.iter().map(|_| Vec::new()).collect();
@@ -315,6 +259,8 @@ fn tell(layer: &LayerSpec, remarks: &[(&str, Remark)], pitch_mm: f64, notes: &mu
     let mut narrow = too_narrow;
     let mut capped: Option<(usize, f64, &str)> = None;
     let mut over: Option<(usize, f64, &str)> = None;
+    let mut lost: Option<(usize, &str, crate::geom::DVec2, SkeletonError)> = None;
+    let mut fell_back: Option<(usize, &str, crate::geom::DVec2, RuledFault)> = None;
     let mut below_base = false;
     for &(source, remark) in remarks {
         match remark {
@@ -343,6 +289,14 @@ fn tell(layer: &LayerSpec, remarks: &[(&str, Remark)], pitch_mm: f64, notes: &mu
                 if by_mm > seen.1 {
                     (seen.1, seen.2) = (by_mm, source);
                 }
+            }
+            Remark::NoSkeleton { at, why } => {
+                let seen = lost.get_or_insert((0, source, at, why));
+                seen.0 += 1;
+            }
+            Remark::FellBack { at, why } => {
+                let seen = fell_back.get_or_insert((0, source, at, why));
+                seen.0 += 1;
             }
             Remark::RidgeBelowBase => below_base = true,
         }
@@ -380,6 +334,20 @@ fn tell(layer: &LayerSpec, remarks: &[(&str, Remark)], pitch_mm: f64, notes: &mu
              they are cut off there"
         ));
     }
+    if let Some((n, source, at, why)) = lost {
+        notes.push(format!(
+            "layer '{name}': {n} part(s) have no skeleton and got the distance profile instead of a crest; the \
+             first: {source}, at {:.1}, {:.1}: {why}",
+            at.x, at.y
+        ));
+    }
+    if let Some((n, source, at, why)) = fell_back {
+        notes.push(format!(
+            "layer '{name}': {n} part(s) got the ratio field because their ruled surface failed a check; the \
+             first: {source}, at {:.1}, {:.1}: {why}",
+            at.x, at.y
+        ));
+    }
     if below_base {
         notes.push(format!(
             "layer '{name}': height_mm = {} lies below base_mm = {}; the layer is flat at base_mm",
@@ -387,3 +355,6 @@ fn tell(layer: &LayerSpec, remarks: &[(&str, Remark)], pitch_mm: f64, notes: &mu
         ));
     }
 }
+
+#[cfg(test)]
+mod figures_tests;

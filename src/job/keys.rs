@@ -53,8 +53,8 @@ pub(super) enum Kind {
     Texts,
     /// Three numbers, for X, Y and Z.
     Vector { min: f64, max: f64, unit: &'static str },
-    /// Pairs of numbers with rising first ones: [diameter, chip load].
-    Pairs { min: f64, max: f64, unit: &'static str },
+    /// Pairs of numbers with rising first ones from `low` to `high`, called `what`: [diameter, chip load].
+    Pairs { what: &'static str, low: f64, high: f64, min: f64, max: f64, unit: &'static str },
     /// Several forms; its reader checks them. The text lists them.
     Forms(&'static str),
 }
@@ -137,7 +137,13 @@ pub(super) const COMBINES: &[&str] =
 /// Names of [`super::CutterShape`], in its order.
 pub(super) const SHAPES: &[&str] = &["flat", "ball"];
 /// Surface methods that there are.
-pub(super) const METHODS: &[&str] = &["profile"];
+pub(super) const METHODS: &[&str] = &["ruled", "ratio", "profile"];
+/// Names of [`super::Prune`], in its order.
+pub(super) const PRUNES: &[&str] = &["inscribed", "half-disc"];
+/// Names of [`super::Split`], in its order.
+pub(super) const SPLITS: &[&str] = &["sleeves", "teddy"];
+/// Names of [`super::Join`], in its order.
+pub(super) const JOINS: &[&str] = &["clusters", "pairs"];
 /// Kinds of operation that there are.
 pub(super) const OPERATIONS: &[&str] = &["rough", "raster"];
 
@@ -152,6 +158,10 @@ const fn mm(min: f64, max: f64) -> Kind {
 const fn deg(min: f64, max: f64) -> Kind {
     Kind::Number { min, max, unit: "degrees" }
 }
+
+/// Chip loads by diameter of the cutter.
+const CHIP_LOADS: Kind =
+    Kind::Pairs { what: "diameter", low: 0.05, high: 100.0, min: 0.0001, max: 5.0, unit: "mm" };
 
 const fn key(name: &'static str, kind: Kind, default: Fallback, doc: &'static str) -> Key {
     Key { name, kind, default, doc }
@@ -400,9 +410,9 @@ pub(super) static LAYER: Section = Section {
         key(
             "surface",
             Kind::Forms(
-                "\"profile\" or { method = \"profile\", profile = \"parabola\", radius_mm = N }",
+                "\"ruled\", \"ratio\", \"profile\" or { method = \"ruled\", profile = \"parabola\", ... }",
             ),
-            Text("profile"),
+            Text("ruled"),
             "how the surface is made from the outline",
         ),
         key(
@@ -462,16 +472,77 @@ pub(super) static SURFACE: Section = Section {
     keys: &[
         key(
             "method",
-            Kind::Forms("\"profile\""),
-            Text("profile"),
-            "profile: height by the distance to the outline",
+            Kind::Forms("\"ruled\", \"ratio\" or \"profile\""),
+            Text("ruled"),
+            "ruled: a level crest over the spine, ruled down to the outline; ratio: the same as a field; \
+             profile: height by the distance to the outline",
         ),
         key("profile", Kind::Choice(PROFILES), Text("parabola"), "cross-section of the flank"),
         key(
             "radius_mm",
             mm(0.01, LENGTH),
             Rule("half the width of each figure"),
-            "the flank ends and a flat top begins this far inside",
+            "profile only: the flank ends and a flat top begins this far inside",
+        ),
+        key(
+            "width_power",
+            Kind::Number { min: 0.0, max: 1.0, unit: "" },
+            Number(0.0),
+            "crest in proportion to (local width / largest width) to this power; 0 = a level crest",
+        ),
+        key(
+            "along",
+            Kind::Pairs { what: "place", low: 0.0, high: 1.0, min: 0.0, max: 10.0, unit: "" },
+            Rule("none"),
+            "crest times a factor over each branch's length: [[0, 1], [0.5, 1.2], [1, 0.4]]",
+        ),
+        key(
+            "hole_base_mm",
+            mm(0.0, 500.0),
+            Rule("base_mm of the layer"),
+            "height of the outline on holes",
+        ),
+        key(
+            "edge_mm",
+            mm(0.01, LENGTH),
+            Rule("area over perimeter of each part"),
+            "edges of the triangles that the spine is found with",
+        ),
+        key(
+            "corner_deg",
+            deg(1.0, 180.0),
+            Number(50.0),
+            "vertices of the artwork that turn by this much are corners",
+        ),
+        key(
+            "prune",
+            Kind::Choice(PRUNES),
+            Text("inscribed"),
+            "where the spine ends: where an inscribed disc fits, or where the half disc does",
+        ),
+        key(
+            "delta",
+            Kind::Number { min: 0.001, max: 0.9, unit: "" },
+            Number(0.15),
+            "prune = \"inscribed\": how much smaller than the half width that disc may be",
+        ),
+        key(
+            "junctions",
+            Kind::Choice(SPLITS),
+            Text("sleeves"),
+            "how stubs at junctions are dissolved",
+        ),
+        key(
+            "join",
+            Kind::Choice(JOINS),
+            Text("clusters"),
+            "how neighbouring junction triangles are merged",
+        ),
+        key(
+            "significance",
+            Kind::Number { min: 0.0, max: 2.0, unit: "" },
+            Number(0.0),
+            "branches shorter than this part of the junction's half width are cut (0.15 for scans); 0 = none",
         ),
     ],
 };
@@ -618,13 +689,13 @@ pub(super) static WOOD: Section = Section {
         key("title", Kind::Text, Rule("the name"), "name for people"),
         key(
             "flat_chip_load_mm",
-            Kind::Pairs { min: 0.0001, max: 5.0, unit: "mm" },
+            CHIP_LOADS,
             Required,
             "[diameter, chip load] of flat cutters, rising diameters",
         ),
         key(
             "ball_chip_load_mm",
-            Kind::Pairs { min: 0.0001, max: 5.0, unit: "mm" },
+            CHIP_LOADS,
             Required,
             "[diameter, chip load] of ball cutters in finishing",
         ),

@@ -7,10 +7,13 @@ use toml::de::{DeTable, DeValue};
 use super::colors;
 use super::draft::{Draft, text_or_form};
 use super::error::{JobError, Source, nearest, shown};
-use super::keys::{LAYER, METHODS, PROFILES, SLOPE_CAP, SURFACE, rule};
+use super::keys::{Key, LAYER, METHODS, PROFILES, SLOPE_CAP, SURFACE, rule};
 use super::reader::{Table, as_number};
 use super::settle::{TOUCHING_MM, round};
-use super::types::{Combine, Found, FoundLayer, LayerSpec, Profile, Rgb, Selector, SurfaceSpec};
+use super::types::{
+    Combine, CrestSpec, Found, FoundLayer, Join, LayerSpec, Profile, Prune, Rgb, Selector,
+    Significance, SkeletonSpec, Split, SurfaceSpec,
+};
 
 /// A layer whose height may still be open.
 #[derive(Debug, Clone, PartialEq)]
@@ -177,25 +180,77 @@ fn read_slope_cap(table: &Table<'_>) -> Result<f64, JobError> {
 }
 
 fn read_surface(layer: &Table<'_>) -> Result<SurfaceSpec, JobError> {
+    let plain = |method: &str| match method {
+        "profile" => SurfaceSpec::Profile { profile: Profile::Parabola, radius_mm: None },
+        "ratio" => SurfaceSpec::Ratio(CrestSpec::default()),
+        _ => SurfaceSpec::Ruled(CrestSpec::default()),
+    };
+    let Some(value) = layer.raw("surface") else {
+        return Ok(plain(layer.text("surface").unwrap_or_default()));
+    };
+    let DeValue::Table(values) = value.get_ref() else {
+        let method = text_or_form(layer, "surface")?;
+        check_method(layer, method, None)?;
+        return Ok(plain(method));
+    };
+    // The method comes first: another method's own keys would only mislead.
+    let method = values.get("method").and_then(|method| method.get_ref().as_str());
+    if let Some(method) = method {
+        check_method(layer, method, values.get("method").map(toml::Spanned::span))?;
+    }
+    let table = layer.table("surface", &SURFACE).expect("the table is given")?;
+    let method = text_or_form(&table, "method")?;
     let profiles =
         [Profile::Parabola, Profile::Round, Profile::Chamfer, Profile::Cove, Profile::Ogee];
-    let plain = SurfaceSpec::Profile { profile: Profile::Parabola, radius_mm: None };
-    let Some(value) = layer.raw("surface") else { return Ok(plain) };
-    if let DeValue::Table(values) = value.get_ref() {
-        // The method comes first: another method's own keys would only mislead.
-        let method = values.get("method").and_then(|method| method.get_ref().as_str());
-        if let Some(method) = method {
-            check_method(layer, method, values.get("method").map(toml::Spanned::span))?;
-        }
-        let table = layer.table("surface", &SURFACE).expect("the table is given")?;
-        text_or_form(&table, "method")?;
-        return Ok(SurfaceSpec::Profile {
-            profile: profiles[table.choice("profile")],
-            radius_mm: table.number("radius_mm"),
-        });
+    let profile = profiles[table.choice("profile")];
+    let foreign = |key: &Key| {
+        let own = if key.name == "radius_mm" { method == "profile" } else { method != "profile" };
+        !own && !["method", "profile"].contains(&key.name) && table.raw(key.name).is_some()
+    };
+    if let Some(key) = SURFACE.keys.iter().find(|key| foreign(key)) {
+        let message = format!("method \"{method}\" does not use {}", key.name);
+        let others = if method == "profile" { "\"ruled\" and \"ratio\"" } else { "\"profile\"" };
+        let help = format!("it belongs to {others}: change the method or leave the key out");
+        return Err(table.impossible(key.name, &message, "without effect", &help));
     }
-    check_method(layer, text_or_form(layer, "surface")?, None)?;
-    Ok(plain)
+    if method == "profile" {
+        return Ok(SurfaceSpec::Profile { profile, radius_mm: table.number("radius_mm") });
+    }
+    let crest = read_crest(&table, profile)?;
+    Ok(if method == "ratio" { SurfaceSpec::Ratio(crest) } else { SurfaceSpec::Ruled(crest) })
+}
+
+/// The keys of the methods with a crest.
+fn read_crest(table: &Table<'_>, profile: Profile) -> Result<CrestSpec, JobError> {
+    let along: Vec<[f64; 2]> = table.pairs("along").into_iter().map(|(a, b)| [a, b]).collect();
+    let whole =
+        along.first().is_some_and(|a| a[0] == 0.0) && along.last().is_some_and(|a| a[0] == 1.0);
+    if !whole && table.raw("along").is_some() {
+        let message = "along must tell the crest's height over the whole branch";
+        let help =
+            "the places rise from 0 at one end to 1 at the other: [[0, 1], [0.5, 1.2], [1, 0.4]]";
+        return Err(table.impossible("along", message, "from 0 to 1", help));
+    }
+    let prunes = [Prune::InscribedDisc { delta: table.sure_number("delta") }, Prune::HalfDisc];
+    if table.raw("delta").is_some() && table.choice("prune") != 0 {
+        let message = "delta belongs to prune = \"inscribed\"";
+        return Err(table.impossible("delta", message, "without effect", "leave it out"));
+    }
+    let rel = table.sure_number("significance");
+    Ok(CrestSpec {
+        profile,
+        width_power: table.sure_number("width_power"),
+        along,
+        hole_base_mm: table.number("hole_base_mm"),
+        skeleton: SkeletonSpec {
+            edge_mm: table.number("edge_mm"),
+            corner_rad: table.sure_number("corner_deg").to_radians(),
+            prune: prunes[table.choice("prune")],
+            split: [Split::Sleeves, Split::Teddy][table.choice("junctions")],
+            join: [Join::Clusters, Join::Pairs][table.choice("join")],
+            significance: (rel > 0.0).then_some(Significance { abs_mm: None, rel }),
+        },
+    })
 }
 
 fn check_method(
@@ -208,7 +263,7 @@ fn check_method(
     }
     let message = format!("there is no surface method {}", shown(method));
     let help = format!(
-        "there is: {}; shapes of its flank: surface = {{ method = \"profile\", profile = \"round\" }} ({})",
+        "there is: {}; shapes of the flank: surface = {{ method = \"ruled\", profile = \"round\" }} ({})",
         METHODS.join(", "),
         PROFILES.join(", ")
     );

@@ -227,7 +227,7 @@ impl<'a> Table<'a> {
         let (min, max, unit) = match kind {
             Kind::Number { min, max, unit }
             | Kind::Vector { min, max, unit }
-            | Kind::Pairs { min, max, unit } => (min, max, unit),
+            | Kind::Pairs { min, max, unit, .. } => (min, max, unit),
             Kind::Whole { min, max } => (f64::from(min), f64::from(max), ""),
             _ => return Ok(()),
         };
@@ -311,24 +311,26 @@ impl<'a> Table<'a> {
     }
 
     fn check_pairs(&self, key: &Key, value: &Spanned<DeValue<'_>>) -> Result<(), JobError> {
-        let diameters = Kind::Number { min: 0.05, max: 100.0, unit: "mm" };
+        let Kind::Pairs { what, low, high, unit, .. } = key.kind else { return Ok(()) };
+        let firsts = Kind::Number { min: low, max: high, unit };
         let wrong = |item: &Spanned<DeValue<'_>>| {
             Err(self.wrong_form(key.name, item.span(), item.get_ref()))
         };
         let Some(items) = value.get_ref().as_array().filter(|items| !items.is_empty()) else {
             return wrong(value);
         };
-        let mut last = 0.0;
+        let mut last = f64::NEG_INFINITY;
         for item in items {
             let Some(pair) = item.get_ref().as_array().filter(|pair| pair.len() == 2) else {
                 return wrong(item);
             };
             let number = |at: usize| pair.get(at).and_then(|v| as_number(v.get_ref()));
-            let (Some(diameter), Some(load)) = (number(0), number(1)) else { return wrong(item) };
-            self.check_range(key.name, item.span(), diameter, diameters)?;
-            self.check_range(key.name, item.span(), load, key.kind)?;
-            if diameter <= last {
-                let message = format!("{}: diameters must rise", self.path_of(key.name));
+            let (Some(first), Some(second)) = (number(0), number(1)) else { return wrong(item) };
+            self.check_range(key.name, item.span(), first, firsts)?;
+            self.check_range(key.name, item.span(), second, key.kind)?;
+            if first <= last {
+                let message =
+                    format!("{}: every {what} must be above the last one", self.path_of(key.name));
                 let fault = self.source.fault(
                     Some(item.span()),
                     &message,
@@ -337,7 +339,7 @@ impl<'a> Table<'a> {
                 );
                 return Err(JobError::OutOfRange(fault));
             }
-            last = diameter;
+            last = first;
         }
         Ok(())
     }
@@ -443,8 +445,8 @@ fn wanted(kind: Kind) -> String {
         Kind::Choice(words) => format!("one of {}", words.join(", ")),
         Kind::Texts => "a list of texts, as [\"one\", \"two\"]".to_owned(),
         Kind::Vector { unit, .. } => format!("three numbers for X, Y and Z{}", of(unit)),
-        Kind::Pairs { unit, .. } => {
-            format!("pairs [diameter, value], as [[3, 0.02], [6, 0.04]]{}", of(unit))
+        Kind::Pairs { what, low, unit, .. } => {
+            format!("pairs [{what}, value], as [[{low}, 0.02], [1, 0.04]]{}", of(unit))
         }
         Kind::Forms(forms) => forms.to_owned(),
     }

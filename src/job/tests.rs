@@ -363,7 +363,7 @@ fn words_in_the_table_are_those_of_the_types() {
     for (index, profile) in profiles.into_iter().enumerate() {
         assert_eq!(word(serde_json::to_value(profile).unwrap()), keys::PROFILES[index]);
         let text = with(&format!(
-            "[[layer]]\nselect = \"all\"\nsurface = {{ profile = \"{}\" }}\n",
+            "[[layer]]\nselect = \"all\"\nsurface = {{ method = \"profile\", profile = \"{}\" }}\n",
             keys::PROFILES[index]
         ));
         assert_eq!(

@@ -5,13 +5,14 @@ use std::fmt::Write as _;
 use super::draft::Draft;
 use super::error::JobError;
 use super::keys::{
-    ARTWORK, BACKGROUND, COMBINES, CUTTER, Fallback, JOB, LAYER, MACHINE, OPERATION, ORIGINS,
-    PROFILES, RELIEF, SAFETY, SHAPES, STOCK, SURFACE, Section, TOLERANCE, TOP, WOOD, rule,
+    ARTWORK, BACKGROUND, COMBINES, CUTTER, Fallback, JOB, JOINS, LAYER, MACHINE, OPERATION,
+    ORIGINS, PROFILES, PRUNES, RELIEF, SAFETY, SHAPES, SPLITS, STOCK, SURFACE, Section, TOLERANCE,
+    TOP, WOOD, rule,
 };
 use super::library::Library;
 use super::types::{
     Background, CutterSpec, Fit, Found, Job, LayerSpec, Machine, Operation, OperationKind, Place,
-    Stepover, SurfaceSpec, Wood,
+    Prune, SkeletonSpec, Stepover, SurfaceSpec, Wood,
 };
 use crate::geom::{DVec2, DVec3};
 
@@ -281,17 +282,53 @@ fn safety_lines(job: &Job) -> Vec<Line> {
     ]
 }
 
-fn layer_lines(layer: &LayerSpec) -> Vec<Line> {
-    let (method, profile, radius_mm) = match &layer.surface {
-        SurfaceSpec::Profile { profile, radius_mm } => ("profile", *profile, *radius_mm),
-        SurfaceSpec::Ruled(crest) => ("ruled", crest.profile, None),
-        SurfaceSpec::Ratio(crest) => ("ratio", crest.profile, None),
+fn surface_lines(surface: &SurfaceSpec) -> Vec<Line> {
+    let (method, crest) = match surface {
+        SurfaceSpec::Profile { profile, radius_mm } => {
+            let mut lines = vec![
+                ("method", quoted("profile")),
+                ("profile", quoted(PROFILES[*profile as usize])),
+            ];
+            lines.extend(radius_mm.map(|radius| ("radius_mm", number(radius))));
+            return lines;
+        }
+        SurfaceSpec::Ruled(crest) => ("ruled", crest),
+        SurfaceSpec::Ratio(crest) => ("ratio", crest),
     };
-    let mut surface =
-        vec![("method", quoted(method)), ("profile", quoted(PROFILES[profile as usize]))];
-    if let Some(radius) = radius_mm {
-        surface.push(("radius_mm", number(radius)));
+    let mut lines =
+        vec![("method", quoted(method)), ("profile", quoted(PROFILES[crest.profile as usize]))];
+    // What differs from the defaults; the rest would bury it.
+    let (plain, own) = (SkeletonSpec::default(), &crest.skeleton);
+    if crest.width_power > 0.0 {
+        lines.push(("width_power", number(crest.width_power)));
     }
+    if !crest.along.is_empty() {
+        let pairs: Vec<String> =
+            crest.along.iter().map(|[a, b]| format!("[{}, {}]", number(*a), number(*b))).collect();
+        lines.push(("along", format!("[{}]", pairs.join(", "))));
+    }
+    lines.extend(crest.hole_base_mm.map(|base| ("hole_base_mm", number(base))));
+    lines.extend(own.edge_mm.map(|edge| ("edge_mm", number(edge))));
+    if own.corner_rad != plain.corner_rad {
+        lines.push(("corner_deg", degrees(own.corner_rad)));
+    }
+    match own.prune {
+        Prune::HalfDisc => lines.push(("prune", quoted(PRUNES[1]))),
+        Prune::InscribedDisc { .. } if own.prune == plain.prune => {}
+        Prune::InscribedDisc { delta } => lines.push(("delta", number(delta))),
+    }
+    if own.split != plain.split {
+        lines.push(("junctions", quoted(SPLITS[own.split as usize])));
+    }
+    if own.join != plain.join {
+        lines.push(("join", quoted(JOINS[own.join as usize])));
+    }
+    lines.extend(own.significance.map(|s| ("significance", number(s.rel))));
+    lines
+}
+
+fn layer_lines(layer: &LayerSpec) -> Vec<Line> {
+    let surface = surface_lines(&layer.surface);
     debug_assert!(surface.iter().all(|(name, _)| SURFACE.key(name).is_some()));
     let cap = if layer.slope_cap.is_finite() { number(layer.slope_cap) } else { quoted("none") };
     vec![

@@ -123,6 +123,28 @@ pub(super) fn check_edges<'a>(
     found.map_or(Ok(()), |at| Err(RegionFault::Meets { at }))
 }
 
+/// The edges of some rings, numbered through all of them, that meet another one elsewhere than neighbours at
+/// their common vertex; ascending. Exact predicates; O(n) on average.
+pub(crate) fn meeting_edges<'a>(rings: impl IntoIterator<Item = &'a [DVec2]>) -> Vec<usize> {
+    let grid = EdgeGrid::new(rings);
+    let mut found = Vec::new();
+    for (i, e) in grid.edges.iter().enumerate() {
+        if e.a == e.b || folds_back(e, &grid.edges[e.next as usize]) {
+            found.extend([i, e.next as usize]);
+        }
+    }
+    grid.for_pairs(|_, i, j| {
+        let (e, g) = (&grid.edges[i], &grid.edges[j]);
+        if e.next as usize != j && g.next as usize != i && meets(e, g) {
+            found.extend([i, j]);
+        }
+        true
+    });
+    found.sort_unstable();
+    found.dedup();
+    found
+}
+
 /// True when the second of two consecutive edges runs back over the first.
 fn folds_back(e: &Edge, g: &Edge) -> bool {
     orient(e.a, e.b, g.b) == 0.0 && (e.a - e.b).dot(g.b - e.b) > 0.0

@@ -15,12 +15,15 @@
 
 use super::combine::{feather_weight, joined};
 use super::coverage::coverage;
-use super::raster::rasterise;
+use super::raster::{rasterise, rasterise_in};
 use super::{Relief, ReliefError};
 use crate::geom::{Bounds, DVec2, Grid, Heightfield};
-use crate::job::{Background, Combine, Job, LayerSpec};
+use crate::job::{Background, Combine, Job, LayerSpec, SurfaceSpec};
 use crate::outline::{Figure, Outlines};
-use crate::surface::{Patch, Segments, Surface, Window, inside_spans, outline_height};
+use crate::surface::{
+    FINE_ROWS, Mesh, Patch, Segments, Surface, Window, averaged, inside_spans, lower_walls,
+    outline_height,
+};
 use rayon::prelude::*;
 use std::collections::BTreeSet;
 
@@ -194,18 +197,48 @@ fn sampled(
     figure: &Figure,
     grid: &Grid,
 ) -> Result<(Patch, usize), ReliefError> {
-    match surface {
-        Surface::Field(patch) => Ok((patch, 0)),
-        Surface::Mesh(mesh) => {
-            mesh.check().map_err(|fault| ReliefError::BadMesh {
-                layer: layer.name.clone(),
-                figure: figure.source.clone(),
-                fault,
-            })?;
-            let raster = rasterise(&mesh, grid)?;
-            Ok((raster.patch, raster.doubles))
+    let checked = |mesh: &Mesh| {
+        mesh.check().map_err(|fault| ReliefError::BadMesh {
+            layer: layer.name.clone(),
+            figure: figure.source.clone(),
+            fault,
+        })
+    };
+    let (mut patch, doubles) = match surface {
+        Surface::Field(patch) => return Ok((patch, 0)),
+        Surface::Parts(parts) => {
+            let mut doubles = 0;
+            let mut patches = Vec::with_capacity(parts.len());
+            for part in parts {
+                let (patch, more) = sampled(part, layer, figure, grid)?;
+                doubles += more;
+                patches.push(patch);
+            }
+            return Ok((Patch::highest(patches), doubles));
         }
+        Surface::Mesh(mesh) => {
+            checked(&mesh)?;
+            let raster = rasterise(&mesh, grid)?;
+            (raster.patch, raster.doubles)
+        }
+        Surface::Fine(mesh) => {
+            checked(&mesh)?;
+            (finely(&mesh, grid)?, 0)
+        }
+    };
+    if let SurfaceSpec::Ruled(crest) = &layer.surface {
+        lower_walls(&mut patch, &figure.regions, layer, crest, grid);
     }
+    Ok((patch, doubles))
+}
+
+/// The mean heights of a mesh too narrow for the grid.
+fn finely(mesh: &Mesh, grid: &Grid) -> Result<Patch, ReliefError> {
+    // The range of the rasteriser is checked once, on the grid itself.
+    let window = rasterise(mesh, grid)?.patch.window();
+    Ok(averaged(grid, &window, FINE_ROWS, |grid, window| {
+        rasterise_in(mesh, grid, *window).map_or_else(|_| Patch::empty(*window), |r| r.patch)
+    }))
 }
 
 /// A band of rows on its way through the layers.

@@ -101,7 +101,7 @@ fn outlines(layers: Vec<Vec<Ring>>) -> Outlines {
 
 fn relief(job: &Job, outlines: &Outlines) -> Result<Relief, ReliefError> {
     let grid = grid_of(job)?;
-    let raised = raise_all(outlines, &job.layers, &grid).unwrap();
+    let raised = raise_all(outlines, &job.layers, &grid, &job.tolerance).unwrap();
     merge(job, outlines, raised.surfaces, &grid)
 }
 
@@ -292,7 +292,7 @@ fn a_frame_keeps_the_stock_along_its_edge() {
     job.relief.background = Background::Frame(8.0);
     let fault = super::merge(&job, &art, vec![vec![]], grid).unwrap_err();
     assert!(matches!(fault, ReliefError::Mismatch { layer: 0, figures: 1, surfaces: 0 }));
-    let raised = raise_all(&art, &job.layers, grid).unwrap();
+    let raised = raise_all(&art, &job.layers, grid, &job.tolerance).unwrap();
     let fault = super::merge(&job, &art, raised.surfaces, grid).unwrap_err();
     assert!(matches!(fault, ReliefError::FrameTooWide { .. }));
 }
@@ -386,6 +386,44 @@ fn a_mesh_joins_like_a_field() {
     let fault = merge(&job, &art, vec![vec![turned]], &grid).unwrap_err();
     assert!(matches!(&fault, ReliefError::BadMesh { .. }));
     assert!(fault.to_string().contains("layer 'm'"));
+}
+
+#[test]
+fn a_mesh_too_narrow_for_the_grid_gives_the_means_of_its_cells() {
+    // A strip within one row of cells that passes between the samples of the grid itself.
+    let (low, wide) = (4.05, 0.2 * PITCH);
+    let ring = rectangle(2.0, low, 6.0, wide);
+    let art = outlines(vec![vec![ring.clone()]]);
+    let job = job(vec![LayerSpec { base_mm: 1.0, ..flat("m", 4.0, Combine::Replace) }]);
+    let grid = grid_of(&job).unwrap();
+    let vertices = ring.iter().map(|p| DVec3::new(p.x, p.y, 1.0 + 0.5 * (p.x - 2.0))).collect();
+    let mesh = Mesh { vertices, faces: vec![[0, 1, 2], [0, 2, 3]] };
+    let parts = Surface::Parts(vec![Surface::Fine(mesh)]);
+    let relief = merge(&job, &art, vec![vec![parts]], &grid).unwrap();
+    let y = (low / PITCH).round() * PITCH;
+    for i in 12..28 {
+        // The cell is covered by a fifth; the samples' mean is the plane's height at the node.
+        let x = f64::from(i) * PITCH;
+        near(height(&relief, x, y), 0.2 * (1.0 + 0.5 * (x - 2.0)));
+    }
+}
+
+#[test]
+fn the_parts_of_a_figure_join_by_the_highest() {
+    let (a, b) = (rectangle(2.0, 2.0, 3.0, 6.0), rectangle(5.5, 2.0, 3.0, 6.0));
+    let mut art = outlines(vec![vec![a.clone()]]);
+    art.layers[0].figures[0].regions.push(Region { outer: b.clone(), holes: vec![] });
+    let level = |ring: &Ring, z: f64| {
+        let vertices = ring.iter().map(|p| DVec3::new(p.x, p.y, z)).collect();
+        Surface::Mesh(Mesh { vertices, faces: vec![[0, 1, 2], [0, 2, 3]] })
+    };
+    let job = job(vec![flat("m", 4.0, Combine::Max)]);
+    let grid = grid_of(&job).unwrap();
+    let parts = Surface::Parts(vec![level(&a, 2.0), level(&b, 3.0)]);
+    let relief = merge(&job, &art, vec![vec![parts]], &grid).unwrap();
+    near(height(&relief, 3.0, 4.0), 2.0);
+    near(height(&relief, 7.0, 4.0), 3.0);
+    near(height(&relief, 5.25, 4.0), 0.0);
 }
 
 #[test]

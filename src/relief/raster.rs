@@ -31,13 +31,21 @@ pub struct Raster {
 /// [`ReliefError::MeshTooWide`] for a vertex or triangle beyond the range of the snapped coordinates,
 /// or a coordinate that is not a number.
 pub fn rasterise(mesh: &Mesh, grid: &Grid) -> Result<Raster, ReliefError> {
-    let snapped =
-        mesh.vertices.iter().map(|&v| Corner::snap(v, grid)).collect::<Result<Vec<_>, _>>()?;
     let mut bounds = Bounds::EMPTY;
     for v in &mesh.vertices {
         bounds.add(v.truncate());
     }
-    let window = Window::around(grid, &bounds);
+    rasterise_in(mesh, grid, Window::around(grid, &bounds))
+}
+
+/// As [`rasterise`], at the nodes of `window` only.
+pub(super) fn rasterise_in(
+    mesh: &Mesh,
+    grid: &Grid,
+    window: Window,
+) -> Result<Raster, ReliefError> {
+    let snapped =
+        mesh.vertices.iter().map(|&v| Corner::snap(v, grid)).collect::<Result<Vec<_>, _>>()?;
     let mut raster = Raster { patch: Patch::empty(window), doubles: 0 };
     if window.is_empty() {
         return Ok(raster);

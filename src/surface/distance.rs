@@ -85,21 +85,40 @@ impl Lists {
 impl Segments {
     /// The segments of closed rings.
     pub fn of_rings<'a>(rings: impl IntoIterator<Item = &'a [DVec2]>) -> Self {
-        let mut list = Vec::new();
-        let mut reach = 0.0_f64;
+        let mut segments = Self::default();
         for ring in rings {
-            let Some(&last) = ring.last() else { continue };
-            let mut a = last;
-            for &b in ring {
-                let along = b - a;
-                let square = along.length_squared();
-                let inverse = if square > f64::MIN_POSITIVE { 1.0 / square } else { 0.0 };
-                list.push(Segment { start: a, along, inverse });
-                reach = reach.max(b.abs().max_element());
-                a = b;
+            if let Some(&last) = ring.last() {
+                segments.add(last, ring);
             }
         }
-        Self { list, slack: 1e-12 * (1.0 + reach) }
+        segments
+    }
+
+    /// The segments of open polylines; a line of one point is that point.
+    pub fn of_lines<'a>(lines: impl IntoIterator<Item = &'a [DVec2]>) -> Self {
+        let mut segments = Self::default();
+        for line in lines {
+            match line {
+                [] => {}
+                [point] => segments.add(*point, line),
+                [first, rest @ ..] => segments.add(*first, rest),
+            }
+        }
+        segments
+    }
+
+    /// Adds the segments from `a` through `points`.
+    fn add(&mut self, mut a: DVec2, points: &[DVec2]) {
+        let mut reach = a.abs().max_element();
+        for &b in points {
+            let along = b - a;
+            let square = along.length_squared();
+            let inverse = if square > f64::MIN_POSITIVE { 1.0 / square } else { 0.0 };
+            self.list.push(Segment { start: a, along, inverse });
+            reach = reach.max(b.abs().max_element());
+            a = b;
+        }
+        self.slack = self.slack.max(1e-12 * (1.0 + reach));
     }
 
     /// Number of segments.
@@ -333,6 +352,17 @@ mod tests {
         let grid = Grid::covering(DVec2::splat(-10.0), 20.0, 20.0, 0.19).unwrap();
         assert!(worst(&rings, &grid) < 1e-9);
         assert!(worst(&rings[..1], &grid) < 1e-9);
+    }
+
+    #[test]
+    fn open_lines_end_where_they_end() {
+        let [a, b, c] = [DVec2::ZERO, DVec2::new(2.0, 0.0), DVec2::new(2.0, 2.0)];
+        let lines = [&[a, b, c][..], &[], &[DVec2::new(-3.0, 5.0)]];
+        let segments = Segments::of_lines(lines);
+        assert_eq!(segments.len(), 3);
+        assert_eq!(segments.distance(DVec2::new(1.0, 1.0)), 1.0);
+        assert_eq!(segments.distance(DVec2::new(2.0, 5.0)), 3.0);
+        assert_eq!(segments.distance(DVec2::new(-3.0, 6.0)), 1.0);
     }
 
     #[test]

@@ -11,20 +11,15 @@
 //! With R left out it is the largest inscribed radius of each region, so that every region has a ridge
 //! of its own height H' and no flat top. Where d < R on the medial axis the surface has a crease.
 
-use super::{Patch, Remark, Segments, Window, inscribed_radius, inside_spans};
-use crate::geom::{DVec2, Grid};
+use super::{FINE_ROWS, Patch, Remark, Segments, Window, averaged, inscribed_radius, inside_spans};
+use crate::geom::Grid;
 use crate::job::{LayerSpec, Profile};
 use crate::outline::{Figure, Region};
-use rayon::prelude::*;
 
-/// Samples along each side of a cell in regions too narrow for the grid.
-const FINE: usize = 4;
-/// Rows of the grid that one task samples finely.
-const FINE_ROWS: usize = 16;
 /// How exactly the inscribed radius is found, in cells.
-const RADIUS_CELLS: f64 = 1e-3;
+pub(super) const RADIUS_CELLS: f64 = 1e-3;
 /// Ridges lowered by less than this are not worth a remark, mm.
-const TOLD_MM: f64 = 1e-3;
+pub(super) const TOLD_MM: f64 = 1e-3;
 
 /// Cross-section `f(u)` of a flank, u = 0 on the outline (f = 0), 1 on the ridge (f = 1); u is clamped
 /// to 0..=1.
@@ -135,48 +130,35 @@ pub(super) fn raise(
     if flank.height_mm < flank.base_mm {
         remarks.push(Remark::RidgeBelowBase);
     }
-    let mut parts: Vec<Patch> =
+    let parts: Vec<Patch> =
         figure.regions.iter().map(|region| raise_region(region, flank, grid, remarks)).collect();
-    if parts.len() == 1 {
-        return parts.swap_remove(0);
-    }
-    let mut whole = Patch::empty(around(&parts));
-    for part in &parts {
-        for (row, z) in part.z.chunks_exact(part.nx.max(1)).enumerate() {
-            let at = (part.j0 - whole.j0 + row) * whole.nx + (part.i0 - whole.i0);
-            for (out, &z) in whole.z[at..at + part.nx].iter_mut().zip(z) {
-                // `max` of a number and NaN is the number.
-                *out = out.max(z);
-            }
-        }
-    }
-    whole
+    Patch::highest(parts)
 }
 
-/// The smallest window that holds all patches.
-fn around(parts: &[Patch]) -> Window {
-    let full = || parts.iter().filter(|p| !p.z.is_empty());
-    let i0 = full().map(|p| p.i0).min().unwrap_or(0);
-    let j0 = full().map(|p| p.j0).min().unwrap_or(0);
-    let nx = full().map(|p| p.i0 + p.nx).max().unwrap_or(0) - i0;
-    let ny = full().map(|p| p.j0 + p.ny).max().unwrap_or(0) - j0;
-    Window { i0, j0, nx, ny }
-}
-
-fn raise_region(region: &Region, flank: &Flank, grid: &Grid, remarks: &mut Vec<Remark>) -> Patch {
-    let window = Window::around(grid, &region.bounds());
-    let mut patch = Patch::empty(window);
-    let segments = Segments::of_rings(region.rings());
-    let inscribed = inscribed_radius(region, &segments, RADIUS_CELLS * grid.pitch_mm);
-    let (width_mm, at) = (2.0 * inscribed, region.bounds().center());
+/// True for a region less than three cells wide at its widest, with a remark.
+pub(super) fn narrowness(
+    region: &Region,
+    inscribed_mm: f64,
+    grid: &Grid,
+    remarks: &mut Vec<Remark>,
+) -> bool {
+    let (width_mm, at) = (2.0 * inscribed_mm, region.bounds().center());
     let narrow = width_mm < 3.0 * grid.pitch_mm;
     if width_mm < grid.pitch_mm {
         remarks.push(Remark::TooNarrow { width_mm, at });
     } else if narrow {
         remarks.push(Remark::Narrow { width_mm, at });
     }
+    narrow
+}
+
+fn raise_region(region: &Region, flank: &Flank, grid: &Grid, remarks: &mut Vec<Remark>) -> Patch {
+    let window = Window::around(grid, &region.bounds());
+    let segments = Segments::of_rings(region.rings());
+    let inscribed = inscribed_radius(region, &segments, RADIUS_CELLS * grid.pitch_mm);
+    let narrow = narrowness(region, inscribed, grid, remarks);
     if inscribed <= 0.0 || window.is_empty() {
-        return patch;
+        return Patch::empty(window);
     }
     let radius = flank.radius_mm.unwrap_or(inscribed);
     let Flank { base_mm, height_mm, slope_cap, profile, .. } = *flank;
@@ -185,20 +167,17 @@ fn raise_region(region: &Region, flank: &Flank, grid: &Grid, remarks: &mut Vec<R
         remarks.push(Remark::Capped { height_mm: ridge });
     }
     let height = |d: f64| flank.at(d, ridge, radius) as f32;
-    if narrow {
-        let task = FINE_ROWS * window.nx;
-        patch.z.par_chunks_mut(task).enumerate().for_each(|(k, z)| {
-            let rows = Window { j0: window.j0 + k * FINE_ROWS, ny: z.len() / window.nx, ..window };
-            sample_finely(region, &segments, grid, &rows, height, z);
-        });
-    } else {
-        sample(region, &segments, grid, &window, height, &mut patch.z);
-    }
-    patch
+    let draw = |grid: &Grid, window: &Window| {
+        let mut patch = Patch::empty(*window);
+        sample(region, &segments, grid, window, height, &mut patch.z);
+        patch
+    };
+    if narrow { averaged(grid, &window, FINE_ROWS, draw) } else { draw(grid, &window) }
 }
 
-/// Heights at the nodes of the window that lie inside the region; the others stay NaN.
-fn sample(
+/// Heights by the distance to the segments at the nodes of the window that lie inside the region; the
+/// others stay NaN.
+pub(super) fn sample(
     region: &Region,
     segments: &Segments,
     grid: &Grid,
@@ -213,40 +192,6 @@ fn sample(
         }
     }
     segments.fill(grid, window, f64::INFINITY, z, |z| !z.is_nan(), height);
-}
-
-/// The mean height of the samples inside the region within each node's cell.
-fn sample_finely(
-    region: &Region,
-    segments: &Segments,
-    grid: &Grid,
-    window: &Window,
-    height: impl Fn(f64) -> f32 + Sync,
-    z: &mut [f32],
-) {
-    // The samples of a cell lie at -3/8, -1/8, 1/8, 3/8 of the pitch from its node.
-    let pitch_mm = grid.pitch_mm / FINE as f64;
-    let shift = 0.5 * (FINE as f64 - 1.0) * pitch_mm;
-    let fine = Grid {
-        nx: grid.nx * FINE,
-        ny: grid.ny * FINE,
-        pitch_mm,
-        origin: grid.origin - DVec2::splat(shift),
-    };
-    let Window { i0, j0, nx, ny } = *window;
-    let inner = Window { i0: i0 * FINE, j0: j0 * FINE, nx: nx * FINE, ny: ny * FINE };
-    let mut samples = vec![f32::NAN; inner.len()];
-    sample(region, segments, &fine, &inner, height, &mut samples);
-    for (k, z) in z.iter_mut().enumerate() {
-        let (i, j) = (k % nx * FINE, k / nx * FINE);
-        let cell = (j..j + FINE).flat_map(|j| &samples[j * inner.nx + i..j * inner.nx + i + FINE]);
-        let (sum, n) = cell
-            .filter(|s| !s.is_nan())
-            .fold((0.0_f64, 0_u32), |(sum, n), &s| (sum + f64::from(s), n + 1));
-        if n > 0 {
-            *z = (sum / f64::from(n)) as f32;
-        }
-    }
 }
 
 #[cfg(test)]

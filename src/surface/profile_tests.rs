@@ -1,5 +1,5 @@
 use super::*;
-use crate::geom::Ring;
+use crate::geom::{DVec2, Ring, Tolerance};
 use crate::job::{Combine, Selector, SurfaceSpec};
 use crate::outline::{OutlineLayer, Outlines};
 use crate::surface::{Surface, SurfaceError, raise as raise_figure, raise_all};
@@ -37,9 +37,9 @@ fn disc(n: u32, r: f64) -> Ring {
 }
 
 fn heights(figure: &Figure, layer: &LayerSpec, grid: &Grid) -> Patch {
-    match raise_figure(figure, layer, grid).unwrap().surface {
+    match raise_figure(figure, layer, grid, &Tolerance::default()).unwrap().surface {
         Surface::Field(patch) => patch,
-        Surface::Mesh(_) => panic!("the profile gives a field"),
+        _ => panic!("the profile gives a field"),
     }
 }
 
@@ -97,7 +97,7 @@ fn the_cap_is_the_slope_of_a_narrow_flank() {
     let figure = figure(vec![(rectangle(0.0, 0.0, 20.0, 1.0), vec![])]);
     let grid = Grid::covering(DVec2::ZERO, 20.0, 1.0, 0.05).unwrap();
     let layer = LayerSpec { slope_cap: 4.0, ..layer(0.0, 10.0, Profile::Parabola, None) };
-    let raised = raise_figure(&figure, &layer, &grid).unwrap();
+    let raised = raise_figure(&figure, &layer, &grid, &Tolerance::default()).unwrap();
     assert!(
         matches!(raised.remarks[..], [Remark::Capped { height_mm }] if (height_mm - 1.0).abs() < 1e-3)
     );
@@ -191,11 +191,11 @@ fn narrow_figures_are_averaged_and_told() {
     let strip = |width: f64| figure(vec![(rectangle(2.0, 5.1, 16.0, width), vec![])]);
     let flat = layer(1.0, 1.0, Profile::Chamfer, None);
 
-    let raised = raise_figure(&strip(1.0), &flat, &grid).unwrap();
+    let raised = raise_figure(&strip(1.0), &flat, &grid, &Tolerance::default()).unwrap();
     assert!(matches!(raised.remarks[..], [Remark::Narrow { .. }]));
 
     // 0.2 mm on a grid of 0.5 mm: the only row of samples inside is at 5.1875 and belongs to row 10.
-    let raised = raise_figure(&strip(0.2), &flat, &grid).unwrap();
+    let raised = raise_figure(&strip(0.2), &flat, &grid, &Tolerance::default()).unwrap();
     assert!(matches!(raised.remarks[..], [Remark::TooNarrow { .. }]));
     let Surface::Field(z) = raised.surface else { panic!() };
     assert_eq!(z.at(20, 10), 1.0);
@@ -204,7 +204,9 @@ fn narrow_figures_are_averaged_and_told() {
     // A ridge of triangular section: the mean of the samples inside the cell, worked out by hand.
     // Cell of row 10: samples at y = 4.8125, 4.9375 (outside), 5.0625 (outside), 5.1875.
     let ridge = layer(0.0, 1.0, Profile::Chamfer, Some(0.5));
-    let Surface::Field(z) = raise_figure(&strip(1.0), &ridge, &grid).unwrap().surface else {
+    let Surface::Field(z) =
+        raise_figure(&strip(1.0), &ridge, &grid, &Tolerance::default()).unwrap().surface
+    else {
         panic!()
     };
     assert!((f64::from(z.at(20, 10)) - 0.0875 / 0.5).abs() < 1e-6, "{}", z.at(20, 10));
@@ -225,7 +227,8 @@ fn all_figures_come_in_order_with_their_notes() {
     };
     let first = LayerSpec { slope_cap: 4.0, ..layer(0.0, 2.0, Profile::Parabola, None) };
     let second = LayerSpec { name: "leaf".into(), ..layer(3.0, 2.0, Profile::Parabola, None) };
-    let raised = raise_all(&outlines, &[first.clone(), second], &grid).unwrap();
+    let raised =
+        raise_all(&outlines, &[first.clone(), second], &grid, &Tolerance::default()).unwrap();
     assert_eq!(raised.surfaces.iter().map(Vec::len).collect::<Vec<_>>(), [2, 1]);
     let Surface::Field(z) = &raised.surfaces[0][0] else { panic!() };
     let alone = heights(&wide, &first, &grid);
@@ -248,7 +251,7 @@ fn numbers_that_are_none_are_refused() {
     let good = figure(vec![(rectangle(1.0, 1.0, 2.0, 2.0), vec![])]);
     let bad = figure(vec![(vec![DVec2::ZERO, DVec2::NAN, DVec2::ONE], vec![])]);
     let spec = layer(0.0, 1.0, Profile::Chamfer, None);
-    let fault = raise_figure(&bad, &spec, &grid).unwrap_err();
+    let fault = raise_figure(&bad, &spec, &grid, &Tolerance::default()).unwrap_err();
     assert!(matches!(fault, SurfaceError::NotFinite { .. }));
     assert!(fault.to_string().contains("path 'p1'"));
     for spec in [
@@ -257,7 +260,7 @@ fn numbers_that_are_none_are_refused() {
         LayerSpec { draft_rad: 1.6, ..spec.clone() },
         layer(0.0, 1.0, Profile::Chamfer, Some(0.0)),
     ] {
-        let fault = raise_figure(&good, &spec, &grid).unwrap_err();
+        let fault = raise_figure(&good, &spec, &grid, &Tolerance::default()).unwrap_err();
         assert!(matches!(fault, SurfaceError::BadSetting { .. }), "{fault}");
     }
 }
@@ -266,7 +269,9 @@ fn numbers_that_are_none_are_refused() {
 fn a_figure_off_the_grid_raises_nothing_but_a_remark() {
     let grid = Grid::covering(DVec2::ZERO, 4.0, 4.0, 0.5).unwrap();
     let off = figure(vec![(rectangle(10.0, 1.0, 2.0, 2.0), vec![])]);
-    let raised = raise_figure(&off, &layer(0.0, 1.0, Profile::Chamfer, None), &grid).unwrap();
+    let raised =
+        raise_figure(&off, &layer(0.0, 1.0, Profile::Chamfer, None), &grid, &Tolerance::default())
+            .unwrap();
     assert!(matches!(raised.remarks[..], [Remark::OverTheEdge { by_mm }] if by_mm == 8.0));
     let Surface::Field(z) = raised.surface else { panic!() };
     assert!(z.z.iter().all(|z| z.is_nan()));

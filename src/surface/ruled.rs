@@ -324,6 +324,12 @@ fn turns_on(pole: DVec2, a: DVec2, b: DVec2) -> bool {
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum RuledFault {
+    /// Rungs across a limb cross each other.
+    #[error("the rungs across the figure at {at} cross")]
+    CrossingRungs {
+        /// A vertex of the figure, mm.
+        at: DVec2,
+    },
     /// A corner of a triangle is missing or no finite number.
     #[error("triangle {face} of the mesh has a corner that is no point")]
     NoPoint {

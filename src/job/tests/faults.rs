@@ -123,7 +123,12 @@ fn unknown_names_name_the_nearest() {
     let contour = with("[[operation]]\nkind = \"contour\"\n");
     refused(&contour, kind, (4, 8), &["contour", "there is: rough, raster"]);
     let layer = |line: &str| with(&format!("[[layer]]\nselect = \"all\"\n{line}\n"));
-    refused(&layer("surface = \"ruled\""), kind, (5, 11), &["ruled", "there is: profile"]);
+    refused(
+        &layer("surface = \"rule\""),
+        kind,
+        (5, 11),
+        &["rule", "there is: ruled, ratio, profile"],
+    );
     refused(
         &layer("surface = { method = \"butterfly\", levels = 4 }"),
         kind,

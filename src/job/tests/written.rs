@@ -191,7 +191,7 @@ proptest! {
              wood = \"oak\"\n[artwork]\nfile = \"a\\tb.svg\"\nheight_mm = 90\nfont_dirs = [\"x\", \"y\"]\n\
              [relief]\nbackground = {background}\n[safety]\nramp_deg = {ramp}\n\
              [[layer]]\nselect = \"all\"\nheight_mm = {height}\ndraft_deg = {draft_deg}\n\
-             surface = {{ profile = \"{profile}\", radius_mm = 2.5 }}\nslope_cap = \"none\"\nunion = true\n\
+             surface = {{ method = \"profile\", profile = \"{profile}\", radius_mm = 2.5 }}\nslope_cap = \"none\"\nunion = true\n\
              [[operation]]\nkind = \"rough\"\nstepdown_mm = 0.7\nangle_deg = {angle}\n\
              [[operation]]\nkind = \"raster\"\ncutter = \"ball-6\"\nstepover_mm = 0.3\n\
              [[operation]]\nkind = \"raster\"\nangle_deg = {ramp}\n"

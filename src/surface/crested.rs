@@ -1,0 +1,263 @@
+//! Surfaces that rise from the outline to a crest over the spine: B+ with the ratio field to fall back on.
+//!
+//! ```text
+//!   Region -> Skeleton (rings, cells, rungs, spine) -> Heights of the crest -> ruled mesh --checks--> Mesh
+//!                                                                                  \--fail--> ratio field
+//! ```
+
+use super::profile::{self, Flank};
+use super::ridge::{Heights, Ridge};
+use super::rungs::{Rungs, rungs};
+use super::{FINE, Patch, Remark, Segments, Surface, Window, inscribed_radius, ratio, ruled};
+use crate::geom::{DVec2, Grid, Tolerance};
+use crate::job::{CrestSpec, LayerSpec, SkeletonSpec};
+use crate::outline::{Figure, Region};
+use crate::skeleton::{
+    Cells, SampleLimits, Sampled, SkeletonError, Spine, Triangulation, cells, midlines, sample,
+    smooth, spine,
+};
+use rayon::prelude::*;
+
+/// Error of a facet across the crest that is too small to matter, as a fraction of `chord_mm`.
+const FACET_PER_CHORD: f64 = 0.05;
+/// Shortest edge of the resampled outline, in cells.
+const LEAST_EDGE_CELLS: f64 = 2.0;
+/// Rounds of smoothing for a spine that no rungs carry.
+const SMOOTH_ROUNDS: usize = 2;
+
+/// How finely a skeleton and its surface are made.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Fineness {
+    /// Largest distance between the outline and its resampling, mm.
+    pub chord_mm: f64,
+    /// Distance of rungs and of points on the outline, mm.
+    pub spacing_mm: f64,
+    /// Edges of the resampled outline are not split below this, mm.
+    pub least_edge_mm: f64,
+    /// Facets across the crest may leave the profile by this, mm.
+    pub max_facet_mm: f64,
+}
+
+impl Fineness {
+    /// As fine as a grid of this pitch can show, and no finer.
+    pub fn of(pitch_mm: f64, chord_mm: f64) -> Self {
+        Self {
+            chord_mm,
+            spacing_mm: pitch_mm,
+            least_edge_mm: LEAST_EDGE_CELLS * pitch_mm,
+            max_facet_mm: FACET_PER_CHORD * chord_mm,
+        }
+    }
+}
+
+/// A region taken apart: all that its crest surfaces are made of.
+#[derive(Debug, Clone)]
+pub struct Skeleton {
+    /// The resampled rings.
+    pub sampled: Sampled,
+    /// The triangles between their vertices.
+    pub triangulation: Triangulation,
+    /// What pruning left of them.
+    pub cells: Cells,
+    /// The rungs of each run.
+    pub rungs: Vec<Rungs>,
+    /// The spine: through the middles of the rungs where they stand upright, else through the smoothed
+    /// midpoints of the inner edges.
+    pub spine: Spine,
+    /// The spine carries the rungs' middles, so a ruled mesh can be made.
+    pub upright: bool,
+}
+
+impl Skeleton {
+    /// Takes a region apart.
+    ///
+    /// # Errors
+    /// [`SkeletonError`]: the outline cannot be triangulated.
+    pub fn of(
+        region: &Region,
+        spec: &SkeletonSpec,
+        fineness: &Fineness,
+    ) -> Result<Self, SkeletonError> {
+        let limits =
+            SampleLimits { chord_mm: fineness.chord_mm, least_edge_mm: fineness.least_edge_mm };
+        let (sampled, triangulation) = sample(region, spec, &limits)?;
+        let cells = cells(&sampled, &triangulation, spec);
+        let rungs: Vec<Rungs> =
+            cells.runs.par_iter().map(|run| rungs(&sampled, run, fineness.spacing_mm)).collect();
+        let upright = rungs.iter().all(Rungs::upright);
+        let spine = if upright {
+            let lines: Vec<_> = rungs.iter().map(Rungs::midline).collect();
+            spine(&sampled, &cells, &lines)
+        } else {
+            smooth(&spine(&sampled, &cells, &midlines(&sampled, &cells)), SMOOTH_ROUNDS)
+        };
+        Ok(Self { sampled, triangulation, cells, rungs, spine, upright })
+    }
+}
+
+/// The crest that a layer asks for, over a region with `rings` rings.
+pub fn ridge_of(layer: &LayerSpec, crest: &CrestSpec, rings: usize) -> Ridge {
+    let hole_mm = crest.hole_base_mm.unwrap_or(layer.base_mm);
+    let base_mm = (0..rings).map(|ring| if ring == 0 { layer.base_mm } else { hole_mm }).collect();
+    Ridge {
+        height_mm: layer.height_mm,
+        base_mm,
+        profile: crest.profile,
+        slope_cap: layer.slope_cap,
+        width_power: crest.width_power,
+        along: crest.along.clone(),
+    }
+}
+
+/// How the crest of a figure is raised.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Method<'a> {
+    /// The layer's crest.
+    pub(super) crest: &'a CrestSpec,
+    /// As a ratio field even where a ruled mesh could be made.
+    pub(super) ratio: bool,
+}
+
+/// Raises every region of a figure. Regions whose ruled mesh fails its checks become ratio fields, and
+/// those without a skeleton distance profiles; remarks say which and why.
+pub(super) fn raise(
+    figure: &Figure,
+    layer: &LayerSpec,
+    method: Method<'_>,
+    grid: &Grid,
+    tolerance: &Tolerance,
+    remarks: &mut Vec<Remark>,
+) -> Surface {
+    let raised: Vec<(Surface, Vec<Remark>)> = figure
+        .regions
+        .par_iter()
+        .with_max_len(1)
+        .map(|region| {
+            let mut remarks = Vec::new();
+            let part = Part { region, layer, method, grid, tolerance };
+            (part.raise(&mut remarks), remarks)
+        })
+        .collect();
+    if layer.height_mm < layer.base_mm {
+        remarks.push(Remark::RidgeBelowBase);
+    }
+    let mut parts = Vec::with_capacity(raised.len());
+    for (surface, more) in raised {
+        parts.push(surface);
+        remarks.extend(more);
+    }
+    if parts.len() == 1 { parts.swap_remove(0) } else { Surface::Parts(parts) }
+}
+
+/// One region and all that its surface depends on.
+struct Part<'a> {
+    region: &'a Region,
+    layer: &'a LayerSpec,
+    method: Method<'a>,
+    grid: &'a Grid,
+    tolerance: &'a Tolerance,
+}
+
+impl Part<'_> {
+    fn raise(&self, remarks: &mut Vec<Remark>) -> Surface {
+        let Self { region, layer, method, grid, tolerance } = *self;
+        let window = Window::around(grid, &region.bounds());
+        let segments = Segments::of_rings(region.rings());
+        let inscribed = inscribed_radius(region, &segments, profile::RADIUS_CELLS * grid.pitch_mm);
+        let narrow = profile::narrowness(region, inscribed, grid, remarks);
+        if window.is_empty() || inscribed <= 0.0 {
+            return Surface::Field(Patch::empty(window));
+        }
+        let cell = if narrow { grid.pitch_mm / FINE as f64 } else { grid.pitch_mm };
+        let fineness = Fineness::of(cell, tolerance.chord_mm);
+        let at = region.bounds().center();
+        let skeleton = match Skeleton::of(region, &method.crest.skeleton, &fineness) {
+            Ok(skeleton) => skeleton,
+            Err(why) => {
+                remarks.push(Remark::NoSkeleton { at, why });
+                let flank = Flank::of(layer, method.crest.profile, None);
+                let figure = Figure { source: String::new(), regions: vec![region.clone()] };
+                return Surface::Field(profile::raise(&figure, &flank, grid, &mut Vec::new()));
+            }
+        };
+        let ridge = ridge_of(layer, method.crest, region.holes.len() + 1);
+        let heights = ridge.heights(&skeleton.spine);
+        self.remark_cap(&heights, remarks);
+        if !method.ratio {
+            match skeleton.mesh(&heights, &ridge, &fineness) {
+                Ok(mesh) if narrow => return Surface::Fine(mesh),
+                Ok(mesh) => return Surface::Mesh(mesh),
+                Err(why) => remarks.push(Remark::FellBack { at, why }),
+            }
+        }
+        let draw = if narrow { ratio::field_finely } else { ratio::field };
+        let mut patch = draw(region, &skeleton.spine, &heights, &ridge, grid, &window);
+        lower_walls(&mut patch, std::slice::from_ref(region), layer, method.crest, grid);
+        Surface::Field(patch)
+    }
+
+    /// Says so when the slope cap keeps even the highest place of the crest down.
+    fn remark_cap(&self, heights: &Heights, remarks: &mut Vec<Remark>) {
+        let points = heights.branches.iter().flatten().chain(&heights.nodes);
+        let height_mm = points.fold(f64::NEG_INFINITY, |a, &b| a.max(b));
+        let free = self.method.crest.width_power == 0.0 && self.method.crest.along.is_empty();
+        if free && self.layer.height_mm - height_mm > profile::TOLD_MM {
+            remarks.push(Remark::Capped { height_mm });
+        }
+    }
+}
+
+impl Skeleton {
+    /// The ruled mesh, checked.
+    ///
+    /// # Errors
+    /// Which check failed, and where: the caller takes the ratio field instead.
+    pub fn mesh(
+        &self,
+        heights: &Heights,
+        ridge: &Ridge,
+        fineness: &Fineness,
+    ) -> Result<super::Mesh, ruled::RuledFault> {
+        if !self.upright {
+            let at = self.sampled.points.first().copied().unwrap_or(DVec2::ZERO);
+            return Err(ruled::RuledFault::CrossingRungs { at });
+        }
+        let density =
+            ruled::Density { spacing_mm: fineness.spacing_mm, max_facet_mm: fineness.max_facet_mm };
+        let Self { sampled, cells, rungs, spine, .. } = self;
+        let mesh = ruled::mesh(sampled, cells, rungs, spine, heights, ridge, &density);
+        ruled::check(&mesh, sampled, ridge)?;
+        Ok(mesh)
+    }
+}
+
+/// Lowers a surface whose outline lies at its base to walls with the layer's draft: `b` becomes
+/// `min(b, d / tan(draft))` at distance d inside the outline. Upright walls stay as they are.
+pub fn lower_walls(
+    patch: &mut Patch,
+    regions: &[Region],
+    layer: &LayerSpec,
+    crest: &CrestSpec,
+    grid: &Grid,
+) {
+    let draft = libm::tan(layer.draft_rad);
+    if draft <= 0.0 {
+        return;
+    }
+    let window = patch.window();
+    let mut by = vec![0.0_f32; patch.z.len()];
+    let rings = regions.iter().flat_map(|region| {
+        let base = ridge_of(layer, crest, region.holes.len() + 1).base_mm;
+        region.rings().zip(base).collect::<Vec<_>>()
+    });
+    for (ring, base_mm) in rings.filter(|(_, base)| *base > 0.0) {
+        let mut lower: Vec<f32> =
+            patch.z.iter().map(|z| if z.is_nan() { 0.0 } else { f32::NAN }).collect();
+        let segments = Segments::of_rings([ring]);
+        let depth = |d: f64| (base_mm - d / draft).max(0.0) as f32;
+        segments.fill(grid, &window, base_mm * draft, &mut lower, f32::is_nan, depth);
+        // Beyond the reach of the wall nothing was filled in.
+        by.iter_mut().zip(lower).for_each(|(by, lower)| *by = by.max(lower));
+    }
+    patch.z.iter_mut().zip(by).for_each(|(z, by)| *z -= by);
+}

@@ -1,0 +1,150 @@
+//! Whole figures of section 6.10 of the specification of the surfaces, from the outline to the mesh.
+
+use super::crested::{Fineness, Skeleton};
+use super::ridge::Ridge;
+use super::{Mesh, ruled};
+use crate::geom::{DVec2, Ring, orient};
+use crate::job::{Profile, Prune, SkeletonSpec};
+use crate::skeleton::fixture::{bar, hexring2, plus2, sampled};
+use crate::skeleton::{Sampled, cells, spine, triangulate};
+use crate::surface::{Rungs, rungs};
+use std::f64::consts::TAU;
+
+const HALF_CURVE: usize = 16;
+
+fn spec(prune: Prune) -> SkeletonSpec {
+    SkeletonSpec { prune, corner_rad: f64::INFINITY, ..SkeletonSpec::default() }
+}
+
+const DISC: Prune = Prune::InscribedDisc { delta: 0.15 };
+
+/// Rungs and mesh of height 1 at a spacing, half curves in 16 parts.
+fn raise(s: Sampled, prune: Prune, spacing_mm: f64) -> (Vec<Rungs>, Mesh) {
+    let t = triangulate(&s).unwrap();
+    let c = cells(&s, &t, &spec(prune));
+    let rungs: Vec<Rungs> = c.runs.iter().map(|run| rungs(&s, run, spacing_mm)).collect();
+    let lines: Vec<_> = rungs.iter().map(Rungs::midline).collect();
+    let spine = spine(&s, &c, &lines);
+    let ridge = Ridge {
+        height_mm: 1.0,
+        base_mm: vec![0.0; s.curves.len()],
+        profile: Profile::Parabola,
+        slope_cap: f64::INFINITY,
+        width_power: 0.0,
+        along: vec![],
+    };
+    let heights = ridge.heights(&spine);
+    let max_facet_mm = 0.25 / (HALF_CURVE * HALF_CURVE) as f64;
+    let density = ruled::Density { spacing_mm, max_facet_mm };
+    let mesh = ruled::mesh(&s, &c, &rungs, &spine, &heights, &ridge, &density);
+    ruled::check(&mesh, &s, &ridge).unwrap();
+    mesh.check().unwrap();
+    (rungs, mesh)
+}
+
+fn count(rungs: &[Rungs]) -> usize {
+    rungs.iter().map(|r| r.left.len()).sum()
+}
+
+/// Area in plan and volume over the plane z = 0.
+fn area_and_volume(mesh: &Mesh) -> [f64; 2] {
+    let mut sums = [0.0; 2];
+    for face in &mesh.faces {
+        let [a, b, c] = face.map(|v| mesh.vertices[v as usize]);
+        let area = 0.5 * orient(a.truncate(), b.truncate(), c.truncate());
+        sums[0] += area;
+        sums[1] += area * (a.z + b.z + c.z) / 3.0;
+    }
+    sums
+}
+
+fn within(got: f64, want: f64, part: f64) {
+    assert!((got - want).abs() <= part * want, "{got} is not {want} within {part}");
+}
+
+#[test]
+fn the_figures_have_the_rungs_areas_and_volumes_of_the_table() {
+    let half = Prune::HalfDisc;
+    for (figure, prune, n, area, volume) in [
+        (bar(), half, 51, 17.2871, 9.9896),
+        (hexring2(), half, 249, 43.924, 29.254),
+        (plus2(), DISC, 0, 28.902, 16.005),
+    ] {
+        let (rungs, mesh) = raise(sampled(&figure), prune, 0.1);
+        let [a, v] = area_and_volume(&mesh);
+        assert!(count(&rungs).abs_diff(n) <= n / 50, "{} rungs for {n}", count(&rungs));
+        within(a, area, 0.003);
+        within(v, volume, 0.003);
+    }
+}
+
+fn rectangle(edge: f64) -> Sampled {
+    let mut ring = Vec::new();
+    let corners = [[0.0, 0.0], [10.0, 0.0], [10.0, 2.0], [0.0, 2.0]].map(DVec2::from);
+    for (k, &a) in corners.iter().enumerate() {
+        let b = corners[(k + 1) % 4];
+        let n = (a.distance(b) / edge) as u32;
+        ring.extend((0..n).map(|j| a + (b - a) * (f64::from(j) / f64::from(n))));
+    }
+    Sampled::four_point([ring.as_slice()], 0.5)
+}
+
+#[test]
+fn a_rectangle_has_the_parabola_between_its_poles() {
+    // With edges of 0.25 the poles lie on slanted chords, so that the number of rungs is not tabled.
+    for (edge, n, table, exact) in [
+        (0.5, Some(161), 12.6537, 38.0 / 3.0),
+        (1.0, Some(161), 12.6537, 38.0 / 3.0),
+        (0.25, None, 12.7370, 12.75),
+    ] {
+        let (rungs, mesh) = raise(rectangle(edge), DISC, 0.05);
+        let [area, volume] = area_and_volume(&mesh);
+        println!("{volume}");
+        assert!(n.is_none_or(|n| count(&rungs) == n));
+        within(area, 20.0, 1e-9);
+        within(volume, table, 1e-4);
+        within(volume, exact, 2e-3);
+        for v in mesh.vertices.iter().filter(|v| (1.0..=9.0).contains(&v.x)) {
+            assert!((v.z - (1.0 - (v.y - 1.0) * (v.y - 1.0))).abs() < 1e-12, "{v}");
+        }
+    }
+}
+
+fn circle(n: u32, r: f64, phase: f64) -> Ring {
+    (0..n).map(|k| DVec2::from_angle(phase + TAU * f64::from(k) / f64::from(n)) * r).collect()
+}
+
+#[test]
+fn an_annulus_has_even_rungs_and_the_exact_height() {
+    let outer = circle(720, 5.0, 0.0);
+    let mut hole = circle(720, 3.0, 0.003);
+    hole.reverse();
+    let region = crate::outline::Region { outer, holes: vec![hole] };
+    let fineness =
+        Fineness { chord_mm: 0.02, spacing_mm: 0.1, least_edge_mm: 0.2, max_facet_mm: 1e-3 };
+    let spec = SkeletonSpec { edge_mm: Some(1.0), ..SkeletonSpec::default() };
+    let skeleton = Skeleton::of(&region, &spec, &fineness).unwrap();
+    assert!(skeleton.cells.caps.is_empty() && skeleton.rungs.len() == 1);
+    let line = skeleton.rungs[0].midline();
+    // The table's 316 rungs count the first one again at the end.
+    assert_eq!(line.len() + 1, 316);
+    for (k, p) in line.iter().enumerate() {
+        assert!((p.at.length() - 4.0).abs() < 6e-4, "{}", p.at.length());
+        let step = p.at.distance(line[(k + 1) % line.len()].at);
+        assert!((step - 0.0796).abs() < 4e-4, "{step}");
+    }
+    let (_, mesh) = raise(skeleton.sampled, DISC, 0.1);
+    let [_, volume] = area_and_volume(&mesh);
+    within(volume, 33.478, 5e-4);
+    let errors: Vec<f64> = mesh
+        .vertices
+        .iter()
+        .map(|v| {
+            let r = v.truncate().length();
+            v.z - (1.0 - (r - 4.0) * (r - 4.0))
+        })
+        .collect();
+    let rms = (errors.iter().map(|e| e * e).sum::<f64>() / errors.len() as f64).sqrt();
+    let max = errors.iter().fold(0.0_f64, |a, e| a.max(e.abs()));
+    assert!(rms < 0.0009 && max < 0.0015, "{rms} {max}");
+}
