@@ -3,6 +3,8 @@
 use super::tests::{euler, level};
 use super::*;
 use crate::geom::Ring;
+use crate::job::{Prune, SkeletonSpec};
+use crate::skeleton;
 use crate::skeleton::{Branch, Cap, Class, NO_TRIANGLE, Run, RunInBranch, SpinePoint};
 use crate::skeleton::{Triangulation, triangulate};
 use proptest::prelude::*;
@@ -95,4 +97,69 @@ proptest! {
         prop_assert_eq!(mesh.check(), Ok(()));
         prop_assert_eq!(euler(&mesh), 2 - rings.len() as i64);
     }
+}
+
+/// A figure taken through cells and rungs as the specification's tests do: rungs `spacing_mm` apart, half
+/// curves of `parts` parts, crest level at 1.
+struct Whole {
+    mesh: Mesh,
+    fault: Result<(), RuledFault>,
+}
+
+fn whole(rings: &[Ring], prune: Prune, spacing_mm: f64, parts: usize) -> Option<Whole> {
+    let spec = SkeletonSpec { prune, ..SkeletonSpec::default() };
+    let sampled = skeleton::fixture::sampled(rings);
+    let triangulation = triangulate(&sampled).ok()?;
+    let cells = skeleton::cells(&sampled, &triangulation, &spec);
+    let rungs: Vec<Rungs> =
+        cells.runs.iter().map(|r| crate::surface::rungs(&sampled, r, spacing_mm)).collect();
+    let lines: Vec<_> = rungs.iter().map(Rungs::midline).collect();
+    let spine = skeleton::spine(&sampled, &cells, &lines);
+    let ridge = level(rings.len());
+    let heights = ridge.heights(&spine);
+    let crest = Crest::new(&sampled, &cells, &rungs, &spine, &heights, &ridge);
+    let mesh = Patches::new(&sampled, &cells, &rungs, &crest, &ridge, spacing_mm)
+        .raise(ridge.profile, parts);
+    let fault = check(&mesh, &sampled, &ridge);
+    Some(Whole { mesh, fault })
+}
+
+/// Blobs by Fourier series, every third one with a hole.
+#[test]
+fn nearly_all_random_blobs_have_a_sound_surface() {
+    let mut seed = 12345_u64;
+    let mut random = || {
+        seed = (1_103_515_245 * seed + 12345) % (1 << 31);
+        2.0 * seed as f64 / (1_u64 << 31) as f64 - 1.0
+    };
+    let mut sound = 0;
+    let total = 150;
+    for figure in 0..total {
+        let mut blob = |size: f64, n: usize, rough: f64, way: f64| {
+            let waves: Vec<[f64; 2]> =
+                (2..8).map(|k| [rough * random() / f64::from(k), 3.2 * random()]).collect();
+            let at = |k: usize| {
+                let angle = std::f64::consts::TAU * k as f64 / n as f64;
+                let wave = |(m, w): (usize, &[f64; 2])| {
+                    w[0] * libm::cos((m + 2) as f64 * angle * way + w[1])
+                };
+                size * (1.0 + waves.iter().enumerate().map(wave).sum::<f64>())
+            };
+            polar(&(0..n).map(at).collect::<Vec<_>>(), way)
+        };
+        let mut rings = vec![blob(5.0, 60, 0.8, 1.0)];
+        if figure % 3 == 0 {
+            rings.push(blob(1.0, 24, 0.3, -1.0));
+        }
+        let prune = [Prune::InscribedDisc { delta: 0.15 }, Prune::HalfDisc][figure % 2];
+        let Some(whole) = whole(&rings, prune, 0.25, 8) else { continue };
+        match whole.fault {
+            Ok(()) => {
+                assert_eq!(euler(&whole.mesh), 2 - rings.len() as i64);
+                sound += 1;
+            }
+            Err(fault) => println!("figure {figure}: {fault}"),
+        }
+    }
+    assert!(sound * 100 >= total * 98, "{sound} of {total}");
 }
