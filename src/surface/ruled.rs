@@ -153,7 +153,7 @@ impl Patches {
             crest: (rungs.left[k] + rungs.right[k]) * 0.5,
             height: line[k],
             foot,
-            base: base(ridge, rungs.rings[side] as usize),
+            base: ridge.base(rungs.rings[side]),
         };
         let n = rungs.left.len().min(rungs.right.len()).min(line.len());
         let walk = || (0..n).chain((rungs.closed && n > 0).then_some(0));
@@ -190,11 +190,6 @@ impl Patches {
     }
 }
 
-/// Height of the outline on a ring, mm.
-fn base(ridge: &Ridge, ring: usize) -> f64 {
-    ridge.base_mm.get(ring).copied().unwrap_or(0.0)
-}
-
 /// What caps, hubs and junctions are built from.
 struct Figure<'a> {
     sampled: &'a Sampled,
@@ -205,7 +200,7 @@ struct Figure<'a> {
 
 impl Figure<'_> {
     fn base_at(&self, v: u32) -> f64 {
-        base(self.ridge, self.sampled.ring(v))
+        self.ridge.base(self.sampled.ring(v) as u32)
     }
 
     fn side_height(&self, a: u32, b: u32) -> f64 {
@@ -423,7 +418,7 @@ fn check_rim(mesh: &Mesh, sampled: &Sampled, ridge: &Ridge, slack: f64) -> Resul
             continue;
         }
         // Along one closed rim, all of it on the ring that is nearest to its first point.
-        let base_mm = base(ridge, nearest_ring(sampled, ridge, at(rim[start][0]).truncate()));
+        let base_mm = ridge.base(nearest_ring(sampled, ridge, at(rim[start][0]).truncate()));
         let mut next = Some(start);
         while let Some(edge) = next {
             seen[edge] = true;
@@ -441,7 +436,7 @@ fn check_rim(mesh: &Mesh, sampled: &Sampled, ridge: &Ridge, slack: f64) -> Resul
 }
 
 /// The ring nearest to a point; any where all have the same base.
-fn nearest_ring(sampled: &Sampled, ridge: &Ridge, at: DVec2) -> usize {
+fn nearest_ring(sampled: &Sampled, ridge: &Ridge, at: DVec2) -> u32 {
     if ridge.base_mm.windows(2).all(|b| b[0] == b[1]) {
         return 0;
     }
@@ -451,9 +446,13 @@ fn nearest_ring(sampled: &Sampled, ridge: &Ridge, at: DVec2) -> usize {
         edges.map(|(&a, &b)| distance_to_segment(at, a, b)).fold(f64::INFINITY, f64::min)
     };
     let rings = 0..sampled.curves.len();
-    rings.min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap_or(0)
+    rings.min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap_or(0) as u32
 }
 
 #[cfg(test)]
 #[path = "ruled_tests.rs"]
 mod tests;
+
+#[cfg(test)]
+#[path = "ruled_whole_tests.rs"]
+mod whole_tests;

@@ -7,7 +7,7 @@ fn v(x: f64, y: f64) -> DVec2 {
 }
 
 /// A level crest of height 1 over a parabola.
-fn level(rings: usize) -> Ridge {
+pub(super) fn level(rings: usize) -> Ridge {
     Ridge {
         height_mm: 1.0,
         base_mm: vec![0.0; rings],
@@ -19,7 +19,7 @@ fn level(rings: usize) -> Ridge {
 }
 
 /// Volume between a mesh and the plane z = 0.
-fn volume(mesh: &Mesh) -> f64 {
+pub(super) fn volume(mesh: &Mesh) -> f64 {
     let prism = |f: &[u32; 3]| {
         let [a, b, c] = f.map(|v| mesh.vertices[v as usize]);
         orient(a.truncate(), b.truncate(), c.truncate()) * (a.z + b.z + c.z) / 6.0
@@ -27,7 +27,7 @@ fn volume(mesh: &Mesh) -> f64 {
     mesh.faces.iter().map(prism).sum()
 }
 
-fn area(mesh: &Mesh) -> f64 {
+pub(super) fn area(mesh: &Mesh) -> f64 {
     let plan = |f: &[u32; 3]| {
         let [a, b, c] = f.map(|v| mesh.vertices[v as usize].truncate());
         orient(a, b, c) / 2.0
@@ -36,7 +36,7 @@ fn area(mesh: &Mesh) -> f64 {
 }
 
 /// V - E + F.
-fn euler(mesh: &Mesh) -> i64 {
+pub(super) fn euler(mesh: &Mesh) -> i64 {
     let sorted = |a: u32, b: u32| (a.min(b), a.max(b));
     let mut edges: Vec<_> = mesh
         .faces
@@ -48,7 +48,7 @@ fn euler(mesh: &Mesh) -> i64 {
     mesh.vertices.len() as i64 - edges.len() as i64 + mesh.faces.len() as i64
 }
 
-fn near(got: f64, wanted: f64, relative: f64) {
+pub(super) fn near(got: f64, wanted: f64, relative: f64) {
     assert!((got / wanted - 1.0).abs() <= relative, "{got} is not {wanted} within {relative}");
 }
 
