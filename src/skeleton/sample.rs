@@ -73,6 +73,9 @@ pub fn sample(
             return Ok((sampled, triangulation));
         }
         split(&mut rings, &long, |_, from, to| Some(0.5 * (from + to)));
+        for marks in &mut rings {
+            marks.follow(limits.chord_mm);
+        }
     }
     unreachable!("the last round returns")
 }
@@ -145,6 +148,9 @@ impl Marks {
     /// The artwork's own vertex between two places that lies farthest from their chord: its place and
     /// distance.
     fn farthest(&self, from: f64, to: f64) -> Option<(f64, f64)> {
+        // Places beyond the ring's start are brought back, and the answer forth again.
+        let lap = self.length() * (from / self.length()).floor();
+        let (from, to) = (from - lap, to - lap);
         let (a, b) = (self.curve.at(from), self.curve.at(to));
         let (points, places, n) =
             (self.curve.points(), self.curve.places(), self.curve.points().len());
@@ -152,7 +158,7 @@ impl Marks {
         (first..first + n)
             .map(|k| (k % n, if k < n { places[k] } else { places[k - n] + self.length() }))
             .take_while(|&(_, s)| s < to - self.same)
-            .map(|(k, s)| (s, distance_to_segment(points[k], a, b)))
+            .map(|(k, s)| (s + lap, distance_to_segment(points[k], a, b)))
             .fold(None, |best: Option<(f64, f64)>, next| match best {
                 Some(best) if best.1 >= next.1 => Some(best),
                 _ => Some(next),

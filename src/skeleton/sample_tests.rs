@@ -37,3 +37,32 @@ fn a_circle_without_corners_is_divided_evenly() {
     assert!((signed_area(&ring) - 78.002188).abs() < 1e-6);
     assert!(ring[1].distance(v(4.897617, 1.006486)) < 1e-6);
 }
+
+#[test]
+fn edges_that_stray_are_split_at_the_seam_of_the_ring_too() {
+    // A comb: many artwork vertices between the last mark and the first one.
+    let mut ring = vec![v(3.0, 0.0), v(40.0, 0.0), v(40.0, 30.0), v(0.0, 30.0), v(0.0, 0.0)];
+    ring.extend((1..30).map(|k| v(0.1 * f64::from(k), if k % 2 == 0 { 0.0 } else { 0.9 })));
+    let region = Region { outer: ring, holes: vec![] };
+    assert_eq!(region.check(), Ok(()));
+    let limits = SampleLimits { chord_mm: 0.02, least_edge_mm: 0.2 };
+    for turn in 0..region.outer.len() {
+        let mut region = region.clone();
+        region.outer.rotate_left(turn);
+        for corner_rad in [0.9, f64::INFINITY] {
+            let spec = SkeletonSpec { corner_rad, ..SkeletonSpec::default() };
+            let (sampled, triangulation) = sample(&region, &spec, &limits).unwrap();
+            assert!(triangulation.identities_hold(sampled.len(), 0));
+            let curve = &sampled.curves[0];
+            for k in 0..sampled.len() {
+                let (a, b) = (sampled.points[k], sampled.points[(k + 1) % sampled.len()]);
+                let stray = 0.02_f64.max(STRAY * a.distance(b)) + 1e-9;
+                let length = sampled.edge_length(k as u32);
+                for j in 0..=20 {
+                    let p = curve.at(sampled.place[k] + length * f64::from(j) / 20.0);
+                    assert!(distance_to_segment(p, a, b) <= stray, "{p}");
+                }
+            }
+        }
+    }
+}

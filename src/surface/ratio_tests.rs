@@ -336,37 +336,3 @@ proptest! {
         }
     }
 }
-#[test]
-fn bench() {
-    let region = Region {
-        outer: circle(1300, 9.0),
-        holes: vec![rectangle(2.0, 2.0, 3.0, 1.0).into_iter().rev().collect()],
-    };
-    let lines: Vec<_> = (0..7)
-        .map(|k| {
-            let d = DVec2::from_angle(f64::from(k));
-            (0..=100)
-                .map(|i| {
-                    let t = f64::from(i) / 100.0;
-                    (d * t * (3.0 + f64::from(k % 4)) + d.perp() * t * t, 1.0 + t * f64::from(k))
-                })
-                .collect()
-        })
-        .collect();
-    let spine = spine(&lines);
-    for n in [350.0, 1400.0, 3600.0] {
-        let grid = Grid::covering(v(-9.0, -9.0), 18.0, 18.0, 18.0 / n).unwrap();
-        let t = std::time::Instant::now();
-        let ridge = ridge(Profile::Ogee, &[0.0, 0.4]);
-        let z = raised(&region, &spine, &ridge, &grid);
-        let all = t.elapsed();
-        let window = Window::whole(&grid);
-        let rows = inside_spans(region.rings(), &grid, &window);
-        let crest = Crest::new(&spine.0, &spine.1);
-        let t = std::time::Instant::now();
-        crest.spread(&rows, &grid, &window);
-        let h = t.elapsed();
-        let inside = z.iter().filter(|z| !z.is_nan()).count();
-        eprintln!("{n}: {inside} inside, all {all:?}, h alone {h:?}");
-    }
-}
