@@ -66,3 +66,85 @@ fn edges_that_stray_are_split_at_the_seam_of_the_ring_too() {
         }
     }
 }
+
+#[test]
+fn scribbles_temp() {
+    use crate::artwork::{Fonts, read_svg};
+    use crate::geom::Tolerance;
+    use crate::job::{Combine, LayerSpec, Profile, Selector, SurfaceSpec};
+    let layer = LayerSpec {
+        name: "a".into(),
+        select: Selector::All,
+        surface: SurfaceSpec::Profile { profile: Profile::Parabola, radius_mm: None },
+        base_mm: 0.0,
+        height_mm: 1.0,
+        offset_mm: 0.0,
+        combine: Combine::Max,
+        blend_mm: 0.0,
+        feather_mm: 0.0,
+        draft_rad: 0.0,
+        slope_cap: f64::INFINITY,
+        union: false,
+        visible: false,
+    };
+    let mut state = 99_u64;
+    let mut rnd = move || {
+        state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        ((state >> 33) % 100_000) as f64 / 1000.0
+    };
+    let (mut n, mut bad, mut most) = (0, 0, 0.0_f64);
+    for round in 0..600 {
+        let curves = round % 3;
+        let k = 4 + (rnd() * 0.4) as usize;
+        let mut d = format!("M{} {}", rnd(), rnd());
+        let snap = |x: f64| if round % 2 == 0 { (x / 5.0).round() * 5.0 } else { x };
+        for _ in 0..k {
+            if curves == 0 {
+                d += &format!("L{} {}", snap(rnd()), snap(rnd()));
+            } else {
+                d += &format!(
+                    "C{} {} {} {} {} {}",
+                    snap(rnd()),
+                    snap(rnd()),
+                    snap(rnd()),
+                    snap(rnd()),
+                    snap(rnd()),
+                    snap(rnd())
+                );
+            }
+        }
+        let text = format!(
+            "<svg xmlns='http://www.w3.org/2000/svg' width='100' height='100'><path fill-rule='evenodd' d='{d}Z'/></svg>"
+        );
+        let art = read_svg(text.as_bytes(), &Fonts::none()).unwrap();
+        let Ok(placed) = art.place(std::slice::from_ref(&layer), 1.0, art.bounds().min) else {
+            continue;
+        };
+        let Ok(outlines) = crate::outline::trace(&placed, &[layer.clone()], &Tolerance::default())
+        else {
+            continue;
+        };
+        for region in outlines.layers[0].figures.iter().flat_map(|f| &f.regions) {
+            for edge in [None, Some(2.0)] {
+                n += 1;
+                let begun = std::time::Instant::now();
+                let r = std::panic::catch_unwind(|| {
+                    let (s, _) = sample(region, &spec(edge), &LIMITS).unwrap();
+                    polygon(&s).check().unwrap();
+                });
+                if r.is_err() {
+                    bad += 1;
+                    println!(
+                        "BAD round {round} n {} D {} {:?}",
+                        region.outer.len(),
+                        region.bounds().size().length(),
+                        sample(region, &spec(edge), &LIMITS).map(|s| s.0.len())
+                    );
+                }
+                most = most.max(begun.elapsed().as_secs_f64());
+            }
+        }
+    }
+    println!("{n} regions, {bad} bad, {most} s at most");
+    assert_eq!(bad, 0);
+}
