@@ -25,7 +25,7 @@ pub use distance::Segments;
 pub use inscribed::inscribed_radius;
 pub use inside::inside_spans;
 pub use mesh::{Mesh, MeshError};
-pub use patch::{FINE, FINE_ROWS, Patch, Window, averaged};
+pub use patch::{FINE, FINE_ROWS, Patch, Window, averaged, finer};
 pub use profile::{capped_height, outline_height, profile_at, smooth_cap};
 pub use ratio::{field as ratio_field, field_finely as ratio_field_finely};
 pub use ridge::{Heights, Ridge};

@@ -15,14 +15,14 @@
 
 use super::combine::{feather_weight, joined};
 use super::coverage::coverage;
-use super::raster::{rasterise, rasterise_in};
+use super::raster::{Bands, rasterise, window_of};
 use super::{Relief, ReliefError};
 use crate::geom::{Bounds, DVec2, Grid, Heightfield};
 use crate::job::{Background, Combine, Job, LayerSpec, SurfaceSpec};
 use crate::outline::{Figure, Outlines};
 use crate::surface::{
-    FINE_ROWS, Mesh, Patch, Segments, Surface, Window, averaged, inside_spans, lower_walls,
-    outline_height,
+    FINE, FINE_ROWS, Mesh, Patch, Segments, Surface, Window, averaged, finer, inside_spans,
+    lower_walls, outline_height,
 };
 use rayon::prelude::*;
 use std::collections::BTreeSet;
@@ -234,11 +234,12 @@ fn sampled(
 
 /// The mean heights of a mesh too narrow for the grid.
 fn finely(mesh: &Mesh, grid: &Grid) -> Result<Patch, ReliefError> {
-    // The range of the rasteriser is checked once, on the grid itself.
-    let window = rasterise(mesh, grid)?.patch.window();
-    Ok(averaged(grid, &window, FINE_ROWS, |grid, window| {
-        rasterise_in(mesh, grid, *window).map_or_else(|_| Patch::empty(*window), |r| r.patch)
-    }))
+    let (fine, window) = (finer(grid), window_of(mesh, grid));
+    let rows = FINE_ROWS * FINE;
+    let Window { i0, j0, nx, ny } = window;
+    let inner = Window { i0: i0 * FINE, j0: j0 * FINE, nx: nx * FINE, ny: ny * FINE };
+    let bands = Bands::new(mesh, &fine, inner, rows)?;
+    Ok(averaged(grid, &window, FINE_ROWS, |_, band| bands.draw((band.j0 - inner.j0) / rows).patch))
 }
 
 /// A band of rows on its way through the layers.

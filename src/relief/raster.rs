@@ -7,6 +7,7 @@
 use super::ReliefError;
 use crate::geom::{Bounds, DVec3, Grid};
 use crate::surface::{Mesh, Patch, Window};
+use rayon::prelude::*;
 
 /// Steps of the snapped coordinates in one pitch.
 const STEPS: i64 = 1 << 16;
@@ -24,36 +25,90 @@ pub struct Raster {
     pub doubles: usize,
 }
 
-/// Samples a mesh at the nodes of the grid. Triangles of either orientation count; those without area
-/// after snapping vanish. Triangles outside the grid are cut off.
+/// Rows of the grid in one band of a raster.
+const ROWS: usize = 64;
+
+/// Samples a mesh at the nodes of the grid, in parallel. Triangles of either orientation count; those
+/// without area after snapping vanish. Triangles outside the grid are cut off.
 ///
 /// # Errors
 /// [`ReliefError::MeshTooWide`] for a vertex or triangle beyond the range of the snapped coordinates,
 /// or a coordinate that is not a number.
 pub fn rasterise(mesh: &Mesh, grid: &Grid) -> Result<Raster, ReliefError> {
+    let window = window_of(mesh, grid);
+    let bands = Bands::new(mesh, grid, window, ROWS)?;
+    let mut patch = Patch::empty(window);
+    let chunk = (ROWS * window.nx).max(1);
+    let doubles = patch.z.par_chunks_mut(chunk).enumerate().map(|(k, z)| {
+        let band = bands.draw(k);
+        z.copy_from_slice(&band.patch.z);
+        band.doubles
+    });
+    let doubles = doubles.sum();
+    Ok(Raster { patch, doubles })
+}
+
+/// The nodes that a mesh may cover.
+pub(super) fn window_of(mesh: &Mesh, grid: &Grid) -> Window {
     let mut bounds = Bounds::EMPTY;
     for v in &mesh.vertices {
         bounds.add(v.truncate());
     }
-    rasterise_in(mesh, grid, Window::around(grid, &bounds))
+    Window::around(grid, &bounds)
 }
 
-/// As [`rasterise`], at the nodes of `window` only.
-pub(super) fn rasterise_in(
-    mesh: &Mesh,
-    grid: &Grid,
+/// A mesh snapped to a grid, its triangles sorted into bands of rows.
+#[derive(Debug)]
+pub(super) struct Bands<'a> {
+    mesh: &'a Mesh,
+    corners: Vec<Corner>,
     window: Window,
-) -> Result<Raster, ReliefError> {
-    let snapped =
-        mesh.vertices.iter().map(|&v| Corner::snap(v, grid)).collect::<Result<Vec<_>, _>>()?;
-    let mut raster = Raster { patch: Patch::empty(window), doubles: 0 };
-    if window.is_empty() {
-        return Ok(raster);
+    rows: usize,
+    /// For each band the triangles with a node in it.
+    faces: Vec<Vec<u32>>,
+}
+
+impl<'a> Bands<'a> {
+    /// Bands of `rows` rows each over `window`.
+    ///
+    /// # Errors
+    /// As [`rasterise`].
+    pub(super) fn new(
+        mesh: &'a Mesh,
+        grid: &Grid,
+        window: Window,
+        rows: usize,
+    ) -> Result<Self, ReliefError> {
+        let corners = mesh.vertices.par_iter().map(|&v| Corner::snap(v, grid));
+        let corners = corners.collect::<Result<Vec<_>, _>>()?;
+        let mut faces = vec![Vec::new(); window.ny.div_ceil(rows)];
+        if !window.is_empty() {
+            for (k, face) in mesh.faces.iter().enumerate() {
+                if let Some(nodes) = nodes_in(face.map(|v| corners[v as usize]), &window)? {
+                    let band = |j: i64| (j as usize - window.j0) / rows;
+                    for band in &mut faces[band(nodes.j0)..=band(nodes.j1)] {
+                        band.push(k as u32);
+                    }
+                }
+            }
+        }
+        Ok(Self { mesh, corners, window, rows, faces })
     }
-    for face in &mesh.faces {
-        triangle(face.map(|v| snapped[v as usize]), &mut raster)?;
+
+    /// The `k`-th band.
+    pub(super) fn draw(&self, k: usize) -> Raster {
+        let first = self.window.j0 + k * self.rows;
+        let window = self.window.rows(first, first + self.rows);
+        let mut raster = Raster { patch: Patch::empty(window), doubles: 0 };
+        for &face in &self.faces[k] {
+            let corners = self.mesh.faces[face as usize].map(|v| self.corners[v as usize]);
+            // Its range was checked when it was sorted in.
+            if let Ok(Some(nodes)) = nodes_in(corners, &window) {
+                triangle(corners, &nodes, &mut raster);
+            }
+        }
+        raster
     }
-    Ok(raster)
 }
 
 /// A vertex in steps from node (0, 0).
@@ -93,25 +148,40 @@ impl Edge {
     }
 }
 
-fn triangle([a, mut b, mut c]: [Corner; 3], raster: &mut Raster) -> Result<(), ReliefError> {
+/// Rows and columns of nodes, both ends included.
+#[derive(Debug, Clone, Copy)]
+struct Nodes {
+    i0: i64,
+    i1: i64,
+    j0: i64,
+    j1: i64,
+}
+
+/// The nodes of `window` in the box of a triangle; `None` when there are none.
+fn nodes_in([a, b, c]: [Corner; 3], window: &Window) -> Result<Option<Nodes>, ReliefError> {
     let low = (a.x.min(b.x).min(c.x), a.y.min(b.y).min(c.y));
     let high = (a.x.max(b.x).max(c.x), a.y.max(b.y).max(c.y));
-    let patch = &mut raster.patch;
-    // Rows and columns of nodes within the box, clamped to the window.
     let first = |low: i64, start: usize| ((low + STEPS - 1).div_euclid(STEPS)).max(start as i64);
     let last = |high: i64, end: usize| high.div_euclid(STEPS).min(end as i64 - 1);
-    let (i0, i1) = (first(low.0, patch.i0), last(high.0, patch.i0 + patch.nx));
-    let (j0, j1) = (first(low.1, patch.j0), last(high.1, patch.j0 + patch.ny));
+    let (i0, i1) = (first(low.0, window.i0), last(high.0, window.i0 + window.nx));
+    let (j0, j1) = (first(low.1, window.j0), last(high.1, window.j0 + window.ny));
     if i0 > i1 || j0 > j1 {
-        return Ok(());
+        return Ok(None);
     }
     if high.0 - low.0 > WIDEST || high.1 - low.1 > WIDEST {
         let mm = |steps: i64| steps as f64 / STEPS as f64;
         return Err(ReliefError::MeshTooWide { x_mm: mm(low.0), y_mm: mm(low.1) });
     }
+    Ok(Some(Nodes { i0, i1, j0, j1 }))
+}
+
+/// Draws a triangle at the given nodes of its box.
+fn triangle([a, mut b, mut c]: [Corner; 3], nodes: &Nodes, raster: &mut Raster) {
+    let patch = &mut raster.patch;
+    let Nodes { i0, i1, j0, j1 } = *nodes;
     let area = (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
     if area == 0 {
-        return Ok(());
+        return;
     }
     if area < 0 {
         std::mem::swap(&mut b, &mut c);
@@ -138,7 +208,6 @@ fn triangle([a, mut b, mut c]: [Corner; 3], raster: &mut Raster) -> Result<(), R
             edge.at = edge.at.wrapping_add(edge.dy);
         }
     }
-    Ok(())
 }
 
 #[cfg(test)]

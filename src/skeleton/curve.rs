@@ -2,6 +2,9 @@
 
 use crate::geom::DVec2;
 
+/// How many segments [`Curve::at_all`] looks to either side before it searches the whole curve.
+const STROLL: usize = 8;
+
 /// A closed polyline over its arc length: the outline between the vertices of a resampled ring.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Curve {
@@ -59,7 +62,32 @@ impl Curve {
     /// The point at arc length `s` (taken modulo the length); exact at the curve's own points.
     pub fn at(&self, s: f64) -> DVec2 {
         let s = self.wrapped(s);
-        let k = self.segment(s);
+        self.on(self.segment(s), s)
+    }
+
+    /// The points at arc lengths that mostly lie close to the one before: quicker than one by one.
+    pub fn at_all(&self, places: impl Iterator<Item = f64>) -> Vec<DVec2> {
+        let (mut k, last) = (0_usize, self.points.len() - 1);
+        let point = |s: f64| {
+            let s = self.wrapped(s);
+            let near = k.saturating_sub(STROLL)..=(k + STROLL).min(last);
+            if self.place[*near.start()] <= s && s < self.place[*near.end() + 1] {
+                while self.place[k] > s {
+                    k -= 1;
+                }
+                while k < last && self.place[k + 1] <= s {
+                    k += 1;
+                }
+            } else {
+                k = self.segment(s);
+            }
+            self.on(k, s)
+        };
+        places.map(point).collect()
+    }
+
+    /// The point at arc length `s` on segment `k`.
+    fn on(&self, k: usize, s: f64) -> DVec2 {
         let (a, b) = (self.points[k], self.points[(k + 1) % self.points.len()]);
         let step = self.place[k + 1] - self.place[k];
         if s == self.place[k] || step <= 0.0 {
@@ -164,5 +192,20 @@ mod tests {
         assert_eq!(c.at(-1.0), v(0.0, 1.0));
         assert_eq!(c.at(14.0), v(0.0, 0.0));
         assert_eq!(c.at(18.0), v(4.0, 0.0));
+    }
+
+    #[test]
+    fn walking_finds_the_same_points_as_searching() {
+        let circle = |k: i32| f64::from(k) * 0.1;
+        let points = (0..62).map(|k| v(libm::cos(circle(k)), libm::sin(circle(k)))).collect();
+        let c = Curve::new(points, 1.0);
+        // Onwards, backwards, beyond both ends, and in leaps.
+        let places: Vec<f64> = (0..400)
+            .map(|k| 7.0 - 0.05 * f64::from(k))
+            .chain((0..50).map(|k| f64::from(k * k % 37) * 0.17))
+            .chain(c.places().iter().copied())
+            .collect();
+        let found = c.at_all(places.iter().copied());
+        assert!(places.iter().zip(found).all(|(&s, p)| p == c.at(s)));
     }
 }

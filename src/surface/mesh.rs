@@ -1,6 +1,9 @@
 //! Triangle meshes and their invariants.
 
-use crate::geom::{DVec3, orient};
+use crate::geom::{Bounds, DVec2, DVec3, orient};
+
+/// A triangle may be turned over by round-off: this area over the square of the mesh's diagonal in plan.
+const TURNED: f64 = 1e-14;
 
 /// A triangle mesh, mm: z is the height above the layer's reference plane.
 #[derive(Debug, Clone, Default)]
@@ -31,45 +34,38 @@ pub enum MeshError {
         /// Number of vertices.
         count: usize,
     },
-    /// A face has no area in plan.
-    #[error("face {face} of the mesh, near {x:.3}, {y:.3}, has no area in plan")]
-    Degenerate {
+    /// A face names a vertex twice.
+    #[error("face {face} of the mesh, at {at}, names a vertex twice")]
+    Repeated {
         /// Index of the face.
         face: usize,
-        /// x of its first vertex, mm.
-        x: f64,
-        /// y of its first vertex, mm.
-        y: f64,
+        /// Its first vertex, mm.
+        at: DVec2,
     },
     /// A face runs clockwise seen from above.
-    #[error("face {face} of the mesh, near {x:.3}, {y:.3}, runs clockwise seen from above")]
+    #[error("a triangle of the mesh at {at} is turned over (area {area_mm2} mm2)")]
     Clockwise {
         /// Index of the face.
         face: usize,
-        /// x of its first vertex, mm.
-        x: f64,
-        /// y of its first vertex, mm.
-        y: f64,
+        /// Its first vertex, mm.
+        at: DVec2,
+        /// Its signed area in plan, mm2.
+        area_mm2: f64,
     },
     /// Two faces run along an edge in the same direction: they overlap or the orientation changes.
-    #[error(
-        "faces {first} and {second} of the mesh run along the edge {from} -> {to} in the same direction"
-    )]
+    #[error("two triangles of the mesh lie on the same side of the edge at {at}")]
     EdgeUsedTwice {
-        /// Start of the edge.
-        from: u32,
-        /// End of the edge.
-        to: u32,
-        /// The face that has it first.
-        first: usize,
-        /// The other face.
-        second: usize,
+        /// Indices of the two vertices of the edge.
+        edge: [u32; 2],
+        /// The middle of the edge, mm.
+        at: DVec2,
     },
 }
 
 impl Mesh {
-    /// Checks the invariants: finite vertices, indices in range, every face counter-clockwise seen
-    /// from above with an area (exact), every directed edge used by at most one face.
+    /// Checks the invariants: finite vertices, indices in range, three vertices to a face, no face
+    /// clockwise seen from above (beyond round-off: 1e-14 of the square of the diagonal), every directed
+    /// edge used by at most one face. Faces without area in plan pass. Linear in the size of the mesh.
     ///
     /// # Errors
     /// The first fault found, by index.
@@ -78,33 +74,84 @@ impl Mesh {
             return Err(MeshError::NotFinite { vertex });
         }
         let count = self.vertices.len();
-        for (face, indices) in self.faces.iter().enumerate() {
-            if let Some(&vertex) = indices.iter().find(|&&v| v as usize >= count) {
+        let mut bounds = Bounds::EMPTY;
+        for v in &self.vertices {
+            bounds.add(v.truncate());
+        }
+        let least = -TURNED * bounds.size().length_squared();
+        for (face, &corners) in self.faces.iter().enumerate() {
+            if let Some(&vertex) = corners.iter().find(|&&v| v as usize >= count) {
                 return Err(MeshError::IndexOutOfRange { face, vertex, count });
             }
-            let [a, b, c] = indices.map(|v| self.vertices[v as usize].truncate());
-            let area = orient(a, b, c);
-            if area == 0.0 {
-                return Err(MeshError::Degenerate { face, x: a.x, y: a.y });
+            let [a, b, c] = corners.map(|v| self.plan(v));
+            if (0..3).any(|k| corners[k] == corners[(k + 1) % 3]) {
+                return Err(MeshError::Repeated { face, at: a });
             }
-            if area < 0.0 {
-                return Err(MeshError::Clockwise { face, x: a.x, y: a.y });
+            let area_mm2 = 0.5 * orient(a, b, c);
+            if area_mm2 < least {
+                return Err(MeshError::Clockwise { face, at: a, area_mm2 });
             }
         }
-        let mut edges: Vec<(u32, u32, usize)> = Vec::with_capacity(3 * self.faces.len());
-        for (face, &[a, b, c]) in self.faces.iter().enumerate() {
-            edges.extend([(a, b, face), (b, c, face), (c, a, face)]);
+        let edges = Edges::of(self);
+        for from in 0..count as u32 {
+            if let Some(e) = edges.from(from).windows(2).find(|e| e[0] == e[1]) {
+                let at = 0.5 * (self.plan(from) + self.plan(e[0]));
+                return Err(MeshError::EdgeUsedTwice { edge: [from, e[0]], at });
+            }
         }
-        edges.sort_unstable();
-        match edges.windows(2).find(|e| (e[0].0, e[0].1) == (e[1].0, e[1].1)) {
-            None => Ok(()),
-            Some(e) => Err(MeshError::EdgeUsedTwice {
-                from: e[0].0,
-                to: e[0].1,
-                first: e[0].2,
-                second: e[1].2,
-            }),
+        Ok(())
+    }
+
+    /// The edges that have a triangle on their left only, `[from, to]`, ascending.
+    pub fn rim(&self) -> Vec<[u32; 2]> {
+        let edges = Edges::of(self);
+        let mut rim = Vec::new();
+        for from in 0..self.vertices.len() as u32 {
+            let single = |to: &&u32| edges.from(**to).binary_search(&from).is_err();
+            rim.extend(edges.from(from).iter().filter(single).map(|&to| [from, to]));
         }
+        rim
+    }
+
+    /// A vertex seen from above.
+    fn plan(&self, v: u32) -> DVec2 {
+        self.vertices[v as usize].truncate()
+    }
+}
+
+/// The directed edges of the faces of a mesh, by the vertex they start from.
+struct Edges {
+    /// Index in `ends` of the first edge of each vertex; one more entry, their number.
+    start: Vec<usize>,
+    /// Where they end, ascending for each vertex.
+    ends: Vec<u32>,
+}
+
+impl Edges {
+    fn of(mesh: &Mesh) -> Self {
+        let mut start = vec![0; mesh.vertices.len() + 1];
+        for &v in mesh.faces.iter().flatten() {
+            start[v as usize + 1] += 1;
+        }
+        for v in 1..start.len() {
+            start[v] += start[v - 1];
+        }
+        let mut next = start.clone();
+        let mut ends = vec![0; 3 * mesh.faces.len()];
+        for &[a, b, c] in &mesh.faces {
+            for (from, to) in [(a, b), (b, c), (c, a)] {
+                ends[next[from as usize]] = to;
+                next[from as usize] += 1;
+            }
+        }
+        for v in 1..start.len() {
+            ends[start[v - 1]..start[v]].sort_unstable();
+        }
+        Self { start, ends }
+    }
+
+    fn from(&self, v: u32) -> &[u32] {
+        &self.ends[self.start[v as usize]..self.start[v as usize + 1]]
     }
 }
 
@@ -138,11 +185,11 @@ mod tests {
 
         let mut m = two_triangles();
         m.faces[0] = [0, 1, 1];
-        assert!(matches!(m.check(), Err(MeshError::Degenerate { face: 0, .. })));
+        assert!(matches!(m.check(), Err(MeshError::Repeated { face: 0, .. })));
 
         let mut m = two_triangles();
-        m.vertices[1] = DVec3::new(2.0, 2.0, 0.0);
-        assert!(matches!(m.check(), Err(MeshError::Degenerate { face: 0, .. })));
+        m.vertices[1] = DVec3::new(2.0 - 1e-9, 2.0, 0.0);
+        assert!(matches!(m.check(), Err(MeshError::Clockwise { face: 0, .. })));
 
         let mut m = two_triangles();
         m.faces[1] = [0, 3, 2];
@@ -152,7 +199,19 @@ mod tests {
         m.vertices.push(DVec3::new(3.0, 3.0, 0.0));
         m.vertices[4] = DVec3::new(0.0, 5.0, 0.0);
         m.faces.push([0, 2, 4]);
-        let fault = MeshError::EdgeUsedTwice { from: 0, to: 2, first: 1, second: 2 };
+        let fault = MeshError::EdgeUsedTwice { edge: [0, 2], at: DVec2::new(2.0, 2.0) };
         assert_eq!(m.check(), Err(fault));
+    }
+
+    #[test]
+    fn a_triangle_without_area_in_plan_is_sound() {
+        let mut m = two_triangles();
+        m.vertices[1] = DVec3::new(2.0, 2.0, 0.0);
+        assert_eq!(m.check(), Ok(()));
+    }
+
+    #[test]
+    fn the_rim_is_what_one_triangle_alone_touches() {
+        assert_eq!(two_triangles().rim(), [[0, 1], [1, 2], [2, 3], [3, 0]]);
     }
 }

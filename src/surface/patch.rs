@@ -127,6 +127,16 @@ impl Patch {
     }
 }
 
+/// The grid of [`FINE`] x [`FINE`] samples of each cell of a grid: at -3/8, -1/8, 1/8 and 3/8 of the pitch
+/// from its node. Node (i, j) has the samples [`FINE`] i, [`FINE`] j and those next to it.
+#[must_use]
+pub fn finer(grid: &Grid) -> Grid {
+    let pitch_mm = grid.pitch_mm / FINE as f64;
+    let shift = 0.5 * (FINE as f64 - 1.0) * pitch_mm;
+    let origin = grid.origin - DVec2::splat(shift);
+    Grid { nx: grid.nx * FINE, ny: grid.ny * FINE, pitch_mm, origin }
+}
+
 /// A patch over `window` whose nodes get the mean of [`FINE`] x [`FINE`] samples of their cells, drawn by
 /// `draw` on a finer grid, `rows` rows of the grid at a time. Samples that are NaN do not count; a node
 /// without any stays NaN.
@@ -136,15 +146,7 @@ pub fn averaged(
     rows: usize,
     draw: impl Fn(&Grid, &Window) -> Patch + Sync,
 ) -> Patch {
-    // The samples of a cell lie at -3/8, -1/8, 1/8, 3/8 of the pitch from its node.
-    let pitch_mm = grid.pitch_mm / FINE as f64;
-    let shift = 0.5 * (FINE as f64 - 1.0) * pitch_mm;
-    let fine = Grid {
-        nx: grid.nx * FINE,
-        ny: grid.ny * FINE,
-        pitch_mm,
-        origin: grid.origin - DVec2::splat(shift),
-    };
+    let fine = finer(grid);
     let mut patch = Patch::empty(*window);
     let Window { i0, j0, nx, .. } = *window;
     let rows = rows.clamp(1, window.ny.max(1));

@@ -16,7 +16,7 @@
 use super::crest::Crest;
 use super::kite::Kite;
 use super::weld::Soup;
-use super::{Heights, Mesh, Ridge, Rungs, profile_at};
+use super::{Heights, Mesh, MeshError, Ridge, Rungs, profile_at};
 use crate::geom::{DVec2, DVec3, bounds_of, distance_to_segment, orient, signed_area};
 use crate::job::Profile;
 use crate::skeleton::{Cells, Hub, Junction, Sampled, Spine};
@@ -32,8 +32,6 @@ const MOST_PIECES: f64 = 4096.0;
 const TANGENT: f64 = 1.0 / 32.0;
 /// A ray of a fan must turn on from the one before it by at least this sine.
 const TURNS_ON: f64 = 1e-9;
-/// A triangle may be turned over by round-off: this area over the square of the figure's diagonal.
-const TURNED: f64 = 1e-14;
 /// How far the rim may be off the outline's height, over the figure's diagonal.
 const RIM: f64 = 1e-9;
 /// How far the mesh may be off the figure's area, over that area.
@@ -174,17 +172,18 @@ impl Patches {
             levels(profile, parts).into_iter().map(|u| (u, profile_at(profile, u))).collect();
         let mut soup = Soup::default();
         for strip in &self.strips {
-            let row = |half: &Half| {
-                let half = *half;
+            soup.grid(levels.len(), strip.len(), |row| {
+                let half = strip[row];
                 levels.iter().rev().map(move |&(u, f)| half.at(u, f))
-            };
-            soup.grid(levels.len(), strip.iter().flat_map(row));
+            });
         }
         for kite in &self.kites {
             let kappas = kite.kappas();
             let at = |s: f64, t: f64| kite.at(s, t).extend(kite.height(kappas, profile, s, t));
-            let row = |&(t, _): &(f64, f64)| levels.iter().map(move |&(s, _)| at(s, t));
-            soup.grid(levels.len(), levels.iter().flat_map(row));
+            soup.grid(levels.len(), levels.len(), |row| {
+                let t = levels[row].0;
+                levels.iter().map(move |&(s, _)| at(s, t))
+            });
         }
         soup.weld()
     }
@@ -330,26 +329,9 @@ pub enum RuledFault {
         /// A vertex of the figure, mm.
         at: DVec2,
     },
-    /// A corner of a triangle is missing or no finite number.
-    #[error("triangle {face} of the mesh has a corner that is no point")]
-    NoPoint {
-        /// Index of the triangle.
-        face: usize,
-    },
-    /// A triangle is turned over.
-    #[error("a triangle at {at} is turned over (area {area_mm2} mm2)")]
-    TurnedOver {
-        /// Its first corner, mm.
-        at: DVec2,
-        /// Its signed area in plan, mm2.
-        area_mm2: f64,
-    },
-    /// Two triangles lie on the same side of an edge.
-    #[error("more than two triangles, or two of unlike orientation, share the edge at {at}")]
-    Shared {
-        /// The middle of the edge, mm.
-        at: DVec2,
-    },
+    /// The mesh has a fault: a triangle is turned over, or two lie on the same side of an edge.
+    #[error("{0}")]
+    Mesh(MeshError),
     /// The rim of the mesh is not on the outline's height: there is a gap between two patches.
     #[error("the rim of the mesh at {at} lies at z = {z_mm} mm, the outline at {base_mm} mm")]
     Gap {
@@ -377,20 +359,13 @@ pub enum RuledFault {
 /// # Errors
 /// The first [`RuledFault`], by index.
 pub fn check(mesh: &Mesh, sampled: &Sampled, ridge: &Ridge) -> Result<(), RuledFault> {
+    mesh.check().map_err(RuledFault::Mesh)?;
     let size = bounds_of(&sampled.points).size().length();
-    let mut area = 0.0;
-    for (face, corners) in mesh.faces.iter().enumerate() {
-        let corner = |v: u32| mesh.vertices.get(v as usize).filter(|p| p.is_finite());
-        let [Some(a), Some(b), Some(c)] = corners.map(corner) else {
-            return Err(RuledFault::NoPoint { face });
-        };
-        let [a, b, c] = [a, b, c].map(|p| p.truncate());
-        let area_mm2 = orient(a, b, c) / 2.0;
-        if area_mm2 < -TURNED * size * size {
-            return Err(RuledFault::TurnedOver { at: a, area_mm2 });
-        }
-        area += area_mm2;
-    }
+    let doubled = |&[a, b, c]: &[u32; 3]| {
+        let [a, b, c] = [a, b, c].map(|v| mesh.vertices[v as usize].truncate());
+        orient(a, b, c)
+    };
+    let area = 0.5 * mesh.faces.iter().map(doubled).sum::<f64>();
     check_rim(mesh, sampled, ridge, RIM * size)?;
     let figure: f64 = sampled.curves.iter().map(|c| signed_area(c.points())).sum();
     if (area - figure).abs() < AREA * figure {
@@ -400,18 +375,10 @@ pub fn check(mesh: &Mesh, sampled: &Sampled, ridge: &Ridge) -> Result<(), RuledF
     }
 }
 
-/// Edges shared as they must be, and those of one triangle at the height of the outline within `slack` mm.
+/// The edges of one triangle alone lie at the height of the outline, within `slack` mm.
 fn check_rim(mesh: &Mesh, sampled: &Sampled, ridge: &Ridge, slack: f64) -> Result<(), RuledFault> {
     let at = |v: u32| mesh.vertices[v as usize];
-    let mut edges: Vec<[u32; 2]> =
-        mesh.faces.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]).collect();
-    edges.sort_unstable();
-    if let Some(e) = edges.windows(2).find(|e| e[0] == e[1]) {
-        let [a, b] = e[0].map(|v| at(v).truncate());
-        return Err(RuledFault::Shared { at: (a + b) * 0.5 });
-    }
-    let rim: Vec<[u32; 2]> =
-        edges.iter().copied().filter(|&[a, b]| edges.binary_search(&[b, a]).is_err()).collect();
+    let rim = mesh.rim();
     let mut seen = vec![false; rim.len()];
     for start in 0..rim.len() {
         if seen[start] {

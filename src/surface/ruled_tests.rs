@@ -416,13 +416,13 @@ fn check_finds_every_fault() {
     let touching = sound.faces.iter().position(|f| f.contains(&(inner as u32))).unwrap();
 
     let got = fault(&|m| m.vertices[inner].z = f64::NAN);
-    assert!(matches!(got, RuledFault::NoPoint { .. }), "{got}");
+    assert_eq!(got, RuledFault::Mesh(MeshError::NotFinite { vertex: inner }));
     let got = fault(&|m| m.faces[3][1] = u32::MAX);
-    assert_eq!(got, RuledFault::NoPoint { face: 3 });
+    assert!(matches!(got, RuledFault::Mesh(MeshError::IndexOutOfRange { face: 3, .. })), "{got}");
     let got = fault(&|m| m.vertices[inner] += DVec3::new(3.0, 0.0, 0.0));
-    assert!(matches!(got, RuledFault::TurnedOver { area_mm2, .. } if area_mm2 < 0.0), "{got}");
+    assert!(matches!(got, RuledFault::Mesh(MeshError::Clockwise { .. })), "{got}");
     let got = fault(&|m| m.faces.push(m.faces[touching]));
-    assert!(matches!(got, RuledFault::Shared { .. }), "{got}");
+    assert!(matches!(got, RuledFault::Mesh(MeshError::EdgeUsedTwice { .. })), "{got}");
     let got = fault(&|m| m.faces.truncate(touching));
     assert!(matches!(got, RuledFault::Gap { base_mm: 0.0, .. }), "{got}");
     // A whole cap less: its base edge gapes.

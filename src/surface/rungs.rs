@@ -107,7 +107,7 @@ impl Side<'_> {
 
     /// The points at walked lengths that hardly ever fall.
     fn points(&self, ts: impl Iterator<Item = f64>) -> Vec<DVec2> {
-        ts.map(|t| self.curve.at(self.place(t))).collect()
+        self.curve.at_all(ts.map(|t| self.place(t)))
     }
 
     /// Unit tangents in walking direction at walked lengths, over `step` to either side; zero where the
@@ -205,8 +205,8 @@ impl<'a> Ladder<'a> {
             dense.symmetrise();
         }
         let [left, right] = self.feet(&dense);
-        let on = |side: &Side, feet: &[Foot]| -> Vec<DVec2> {
-            feet.iter().map(|f| side.curve.at(f.place.unwrap_or(side.place(f.t)))).collect()
+        let on = |side: &Side, feet: &[Foot]| {
+            side.curve.at_all(feet.iter().map(|f| f.place.unwrap_or(side.place(f.t))))
         };
         let (left, right) = (on(&self.sides[0], &left), on(&self.sides[1], &right));
         let n = left.len();
@@ -391,9 +391,8 @@ impl<'a> Dense<'a> {
             let [l, r] = self.feet();
             let (n, closed) = (l.len() - 1, self.ladder.closed);
             let chord: Vec<f64> = l.iter().zip(&r).map(|(l, r)| l.distance(*r)).collect();
-            let mut sorted = chord.clone();
-            sorted.sort_unstable_by(f64::total_cmp);
-            let reach = TANGENT * sorted[n / 2];
+            let median = *chord.clone().select_nth_unstable_by(n / 2, f64::total_cmp).1;
+            let reach = TANGENT * median;
             let [tl, tr] = [0, 1].map(|k| self.ladder.sides[k].tangents(&self.t[k], reach, closed));
             for i in 0..=n {
                 let sum = tl[i] + tr[i];

@@ -6,6 +6,7 @@
 
 use super::Mesh;
 use crate::geom::{DVec3, orient};
+use rayon::prelude::*;
 use std::collections::HashMap;
 
 /// Points closer than this, times the diagonal of the mesh, are one.
@@ -18,46 +19,37 @@ const BUCKET: f64 = 1024.0;
 pub(super) struct Soup {
     vertices: Vec<DVec3>,
     faces: Vec<[u32; 3]>,
+    /// For each vertex: it lies on the border of its patch, where others may have the same point.
+    border: Vec<bool>,
 }
 
 impl Soup {
-    /// Adds the grid of points whose rows have `columns` points each, row after row. Seen from above the
-    /// next row lies to the left of the direction in which the columns run.
-    pub(super) fn grid(&mut self, columns: usize, points: impl Iterator<Item = DVec3>) {
+    /// Adds a grid of points: `rows` rows of `columns` points each, `row(k)` gives the points of the k-th.
+    /// Seen from above the next row lies to the left of the direction in which the columns run.
+    pub(super) fn grid<P: Iterator<Item = DVec3>>(
+        &mut self,
+        columns: usize,
+        rows: usize,
+        row: impl Fn(usize) -> P + Sync,
+    ) {
         let first = self.vertices.len();
-        self.vertices.extend(points);
-        let rows = (self.vertices.len() - first) / columns;
-        for row in 1..rows {
-            for column in 1..columns {
-                let below = first + (row - 1) * columns + column;
-                let above = below + columns;
-                self.quad([below - 1, below, above, above - 1].map(|k| k as u32));
-            }
-        }
-    }
-
-    /// Cuts a quadrilateral, counter-clockwise, by the diagonal that turns no triangle over; where both or
-    /// neither do, by the shorter one in space.
-    fn quad(&mut self, [a, b, c, d]: [u32; 4]) {
-        let at = |k: u32| self.vertices[k as usize];
-        let faults = |cut: [[u32; 3]; 2]| cut.map(|t| fault(t.map(at))).iter().sum::<u32>();
-        let (one, two) = ([[a, b, c], [a, c, d]], [[a, b, d], [b, c, d]]);
-        let longer = at(a).distance_squared(at(c)) > at(b).distance_squared(at(d));
-        let cut = match faults(one).cmp(&faults(two)) {
-            std::cmp::Ordering::Less => one,
-            std::cmp::Ordering::Greater => two,
-            std::cmp::Ordering::Equal => {
-                if longer {
-                    two
-                } else {
-                    one
-                }
-            }
+        self.vertices.resize(first + rows * columns, DVec3::ZERO);
+        let points = self.vertices[first..].par_chunks_mut(columns.max(1)).enumerate();
+        points.for_each(|(k, points)| points.iter_mut().zip(row(k)).for_each(|(p, at)| *p = at));
+        let inner = |k: usize, n: usize| k > 0 && k + 1 < n;
+        let border = |k: usize| !(inner(k % columns, columns) && inner(k / columns, rows));
+        self.border.extend((0..rows * columns).map(border));
+        let (across, up) = (columns.saturating_sub(1), rows.saturating_sub(1));
+        let vertices = &self.vertices;
+        let quad = |k: usize| {
+            let below = first + k / across * columns + k % across + 1;
+            let above = below + columns;
+            quad(vertices, [below - 1, below, above, above - 1].map(|k| k as u32))
         };
-        self.faces.extend(cut);
+        self.faces.par_extend((0..across * up).into_par_iter().flat_map_iter(quad));
     }
 
-    /// Joins points that are the same and drops the triangles that thereby vanish. Each point keeps the
+    /// Joins points on the borders of patches that are the same and drops the triangles that thereby vanish. Each point keeps the
     /// position it was given first.
     pub(super) fn weld(self) -> Mesh {
         let low = self.vertices.iter().copied().fold(DVec3::INFINITY, DVec3::min);
@@ -71,7 +63,12 @@ impl Soup {
         };
         let mut vertices: Vec<DVec3> = Vec::new();
         let mut joined = Vec::with_capacity(self.vertices.len());
-        for &v in &self.vertices {
+        for (&v, &border) in self.vertices.iter().zip(&self.border) {
+            if !border {
+                joined.push(vertices.len() as u32);
+                vertices.push(v);
+                continue;
+            }
             let (from, to) = (bucket(v - DVec3::splat(same)), bucket(v + DVec3::splat(same)));
             let near = |&&k: &&u32| vertices[k as usize].distance(v) <= same;
             let twin = keys(from, to)
@@ -90,6 +87,26 @@ impl Soup {
             .filter(|&[a, b, c]| a != b && b != c && c != a)
             .collect();
         Mesh { vertices, faces }
+    }
+}
+
+/// Cuts a quadrilateral, counter-clockwise, by the diagonal that turns no triangle over; where both or
+/// neither do, by the shorter one in space.
+fn quad(vertices: &[DVec3], [a, b, c, d]: [u32; 4]) -> [[u32; 3]; 2] {
+    let at = |k: u32| vertices[k as usize];
+    let faults = |cut: [[u32; 3]; 2]| cut.map(|t| fault(t.map(at))).iter().sum::<u32>();
+    let (one, two) = ([[a, b, c], [a, c, d]], [[a, b, d], [b, c, d]]);
+    let longer = at(a).distance_squared(at(c)) > at(b).distance_squared(at(d));
+    match faults(one).cmp(&faults(two)) {
+        std::cmp::Ordering::Less => one,
+        std::cmp::Ordering::Greater => two,
+        std::cmp::Ordering::Equal => {
+            if longer {
+                two
+            } else {
+                one
+            }
+        }
     }
 }
 
@@ -124,6 +141,12 @@ mod tests {
         DVec3::new(x, y, z)
     }
 
+    /// Rows of two points.
+    fn grid(soup: &mut Soup, points: &[DVec3]) {
+        let row = |k: usize| points[2 * k..2 * k + 2].iter().copied();
+        soup.grid(2, points.len() / 2, row);
+    }
+
     /// Two squares that meet in an edge whose points differ by round-off become one strip.
     #[test]
     fn patches_are_joined_across_round_off() {
@@ -131,8 +154,8 @@ mod tests {
         let mut soup = Soup::default();
         let one = [v(0.0, 0.0, 0.0), v(1.0, 0.0, 0.0), v(0.0, 1.0, 0.0), v(1.0, 1.0, 0.0)];
         let two = [v(1.0 - e, e, 0.0), v(2.0, 0.0, 0.0), v(1.0 + e, 1.0, -e), v(2.0, 1.0, 0.0)];
-        soup.grid(2, one.into_iter());
-        soup.grid(2, two.into_iter());
+        grid(&mut soup, &one);
+        grid(&mut soup, &two);
         let mesh = soup.weld();
         assert_eq!((mesh.vertices.len(), mesh.faces.len()), (6, 4));
         assert_eq!(mesh.check(), Ok(()));
@@ -147,6 +170,7 @@ mod tests {
             let at = v(scale * f64::from(k) / 999.0, 0.0, 0.0);
             for step in [0.0, 0.4, -0.4, 2.0] {
                 soup.vertices.push(at + v(step * SAME * scale, 0.0, 0.0));
+                soup.border.push(true);
             }
         }
         soup.faces.extend((0..1000_u32).map(|k| [4 * k, 4 * k + 3, (4 * k + 4) % 4000]));
@@ -159,7 +183,7 @@ mod tests {
         let mut soup = Soup::default();
         let pole = v(0.0, 0.0, 1.0);
         let foot = [v(1.0, 0.0, 0.0), v(0.0, 1.0, 0.0), v(-1.0, 0.0, 0.0)];
-        soup.grid(2, foot.into_iter().flat_map(|f| [pole, f]));
+        grid(&mut soup, &foot.map(|f| [pole, f]).concat());
         let mesh = soup.weld();
         assert_eq!((mesh.vertices.len(), mesh.faces.len()), (4, 2));
         assert_eq!(mesh.check(), Ok(()));
@@ -172,7 +196,7 @@ mod tests {
         for turn in 0..4 {
             let p: Vec<DVec3> = (0..4).map(|k| plan[(k + turn) % 4]).collect();
             let mut soup = Soup::default();
-            soup.grid(2, [p[0], p[1], p[3], p[2]].into_iter());
+            grid(&mut soup, &[p[0], p[1], p[3], p[2]]);
             assert_eq!(soup.weld().check(), Ok(()));
         }
     }
@@ -182,10 +206,10 @@ mod tests {
         assert!(Soup::default().weld().vertices.is_empty());
         let mut soup = Soup::default();
         let odd = [f64::NAN, f64::INFINITY, -1e300, 1e300].map(|x| v(x, 0.0, x));
-        soup.grid(2, odd.into_iter());
+        grid(&mut soup, &odd);
         soup.weld();
         let mut soup = Soup::default();
-        soup.grid(2, [DVec3::ONE; 4].into_iter());
+        grid(&mut soup, &[DVec3::ONE; 4]);
         assert!(soup.weld().faces.is_empty());
     }
 }
