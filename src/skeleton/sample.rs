@@ -5,7 +5,7 @@
 //! [`Sampled::curves`] lies on the artwork to within the chords of its own rim.
 
 use super::{Class, Curve, Sampled, SkeletonError, Triangulation, triangulate, turn};
-use crate::geom::{DVec2, distance_to_segment, perimeter, signed_area};
+use crate::geom::{DVec2, distance_to_segment, orient, perimeter, signed_area};
 use crate::job::SkeletonSpec;
 use crate::outline::{Region, meeting_edges};
 
@@ -15,7 +15,7 @@ const LEAST_VERTICES: f64 = 24.0;
 const STRAY: f64 = 0.08;
 /// ...and edges whose sleeve is narrower than this part of their length are split.
 const LONG: f64 = 1.0;
-/// Rounds of splitting edges that are longer than the figure is wide.
+/// Rounds of splitting edges that are longer than the figure is wide or leave their triangle.
 const ROUNDS: usize = 8;
 /// Rounds of splitting edges that meet others.
 const SIMPLE_ROUNDS: usize = 32;
@@ -68,11 +68,19 @@ pub fn sample(
         make_simple(&mut rings)?;
         let sampled = assemble(&rings);
         let triangulation = triangulate(&sampled)?;
+        let stray = straying(&rings, &triangulation, sampled.len());
         let long = too_long(&sampled, &triangulation, limits.least_edge_mm);
-        if round == ROUNDS || long.is_empty() {
+        if round == ROUNDS || (long.is_empty() && stray.is_empty()) {
             return Ok((sampled, triangulation));
         }
-        split(&mut rings, &long, |_, from, to| Some(0.5 * (from + to)));
+        let mut more = long.clone();
+        more.extend(&stray);
+        more.sort_unstable();
+        more.dedup();
+        split(&mut rings, &more, |k, marks, from, to| match stray.binary_search(&k) {
+            Ok(_) => marks.farthest(from, to).map(|(s, _)| s),
+            Err(_) => Some(0.5 * (from + to)),
+        });
         for marks in &mut rings {
             marks.follow(limits.chord_mm);
         }
@@ -145,24 +153,36 @@ impl Marks {
         self.places.get(k + 1).copied().unwrap_or(self.places[0] + self.length())
     }
 
-    /// The artwork's own vertex between two places that lies farthest from their chord: its place and
-    /// distance.
-    fn farthest(&self, from: f64, to: f64) -> Option<(f64, f64)> {
+    /// The artwork's own vertices between two places: their places and where they are.
+    fn between(&self, from: f64, to: f64) -> impl Iterator<Item = (f64, DVec2)> {
         // Places beyond the ring's start are brought back, and the answer forth again.
         let lap = self.length() * (from / self.length()).floor();
         let (from, to) = (from - lap, to - lap);
-        let (a, b) = (self.curve.at(from), self.curve.at(to));
         let (points, places, n) =
             (self.curve.points(), self.curve.places(), self.curve.points().len());
         let first = places[..n].partition_point(|&s| s <= from + self.same);
         (first..first + n)
-            .map(|k| (k % n, if k < n { places[k] } else { places[k - n] + self.length() }))
-            .take_while(|&(_, s)| s < to - self.same)
-            .map(|(k, s)| (s + lap, distance_to_segment(points[k], a, b)))
-            .fold(None, |best: Option<(f64, f64)>, next| match best {
+            .map(move |k| (k % n, if k < n { places[k] } else { places[k - n] + self.length() }))
+            .take_while(move |&(_, s)| s < to - self.same)
+            .map(move |(k, s)| (s + lap, points[k]))
+    }
+
+    /// The artwork's own vertex between two places that lies farthest from their chord: its place and
+    /// distance.
+    fn farthest(&self, from: f64, to: f64) -> Option<(f64, f64)> {
+        let (a, b) = (self.curve.at(from), self.curve.at(to));
+        self.between(from, to).map(|(s, p)| (s, distance_to_segment(p, a, b))).fold(
+            None,
+            |best: Option<(f64, f64)>, next| match best {
                 Some(best) if best.1 >= next.1 => Some(best),
                 _ => Some(next),
-            })
+            },
+        )
+    }
+
+    /// Its vertices.
+    fn points(&self) -> Vec<DVec2> {
+        self.curve.at_all(self.places.iter().copied())
     }
 
     /// Splits the edges that stray from the curve at the artwork's own vertices.
@@ -190,19 +210,19 @@ impl Marks {
     }
 }
 
-/// Splits edges, numbered through all rings, at the place that `at` gives for (ring, from, to); true when
+/// Splits edges, numbered through all rings, at the place that `at` gives for (edge, ring, from, to); true when
 /// any was split.
 fn split(
     rings: &mut [Marks],
     edges: &[usize],
-    at: impl Fn(&Marks, f64, f64) -> Option<f64>,
+    at: impl Fn(usize, &Marks, f64, f64) -> Option<f64>,
 ) -> bool {
     let (mut first, mut k, mut any) = (0, 0, false);
     for marks in rings {
         let mut more = Vec::new();
         while k < edges.len() && edges[k] < first + marks.places.len() {
             let edge = edges[k] - first;
-            more.extend(at(marks, marks.places[edge], marks.after(edge)));
+            more.extend(at(edges[k], marks, marks.places[edge], marks.after(edge)));
             k += 1;
         }
         first += marks.places.len();
@@ -215,12 +235,9 @@ fn split(
 /// Splits edges that meet others until the polygons are simple and the holes lie inside, as they do in
 /// the artwork.
 fn make_simple(rings: &mut [Marks]) -> Result<(), SkeletonError> {
-    let farthest = |marks: &Marks, from, to| marks.farthest(from, to).map(|(s, _)| s);
+    let farthest = |_, marks: &Marks, from, to| marks.farthest(from, to).map(|(s, _)| s);
     for _ in 0..SIMPLE_ROUNDS {
-        let points: Vec<Vec<DVec2>> = rings
-            .iter()
-            .map(|marks| marks.places.iter().map(|&s| marks.curve.at(s)).collect())
-            .collect();
+        let points: Vec<Vec<DVec2>> = rings.iter().map(Marks::points).collect();
         let meeting = meeting_edges(points.iter().map(Vec::as_slice));
         if !meeting.is_empty() {
             if !split(rings, &meeting, farthest) {
@@ -253,8 +270,8 @@ fn assemble(rings: &[Marks]) -> Sampled {
         curves: Vec::with_capacity(rings.len()),
     };
     for marks in rings {
+        sampled.points.extend(marks.points());
         for &s in &marks.places {
-            sampled.points.push(marks.curve.at(s));
             sampled.corner.push(marks.corners.binary_search_by(|c| c.total_cmp(&s)).is_ok());
             sampled.place.push(s);
         }
@@ -262,6 +279,33 @@ fn assemble(rings: &[Marks]) -> Sampled {
         sampled.curves.push(marks.curve.clone());
     }
     sampled
+}
+
+/// The outline's edges whose curve leaves the wedge of its triangle (it crosses the line of one of the inner
+/// edges beside it, as where that edge touches a hollow): rungs could not stand on it. Ascending.
+fn straying(rings: &[Marks], triangulation: &Triangulation, n: usize) -> Vec<usize> {
+    // The vertex opposite each edge of the outline.
+    let mut apex = vec![None; n];
+    for (triangle, neighbours) in triangulation.triangles.iter().zip(&triangulation.neighbours) {
+        for k in (0..3).filter(|&k| neighbours[k] == super::NO_TRIANGLE) {
+            apex[triangle[k] as usize] = Some(triangle[(k + 2) % 3] as usize);
+        }
+    }
+    let at: Vec<DVec2> = rings.iter().flat_map(Marks::points).collect();
+    let (mut stray, mut first) = (Vec::new(), 0);
+    for marks in rings {
+        let count = marks.places.len();
+        for k in 0..count {
+            let (v, w) = (first + k, first + (k + 1) % count);
+            let Some(apex) = apex[v].map(|a: usize| at[a]) else { continue };
+            let within = |p: DVec2| orient(at[w], apex, p) >= 0.0 && orient(apex, at[v], p) >= 0.0;
+            if !marks.between(marks.places[k], marks.after(k)).all(|(_, p)| within(p)) {
+                stray.push(v);
+            }
+        }
+        first += count;
+    }
+    stray
 }
 
 /// The outline's edges that are longer than their sleeve is wide (the mean of its two other sides), and

@@ -9,7 +9,7 @@ use super::profile::{self, Flank};
 use super::ridge::{Heights, Ridge};
 use super::rungs::{Rungs, rungs};
 use super::{FINE, Patch, Remark, Segments, Surface, Window, inscribed_radius, ratio, ruled};
-use crate::geom::{DVec2, Grid, Tolerance};
+use crate::geom::{Grid, Tolerance};
 use crate::job::{CrestSpec, LayerSpec, SkeletonSpec};
 use crate::outline::{Figure, Region};
 use crate::skeleton::{
@@ -218,8 +218,7 @@ impl Skeleton {
         ridge: &Ridge,
         fineness: &Fineness,
     ) -> Result<super::Mesh, ruled::RuledFault> {
-        if !self.upright {
-            let at = self.sampled.points.first().copied().unwrap_or(DVec2::ZERO);
+        if let Some(at) = self.rungs.iter().find_map(Rungs::crossing) {
             return Err(ruled::RuledFault::CrossingRungs { at });
         }
         let density =

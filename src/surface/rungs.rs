@@ -60,13 +60,19 @@ impl Rungs {
 
     /// True when no two consecutive rungs cross (exact).
     pub fn upright(&self) -> bool {
+        self.crossing().is_none()
+    }
+
+    /// Where two consecutive rungs first cross: the middle of the first one.
+    pub fn crossing(&self) -> Option<DVec2> {
         let n = self.left.len();
         let pairs = if self.closed { n } else { n.saturating_sub(1) };
-        (0..pairs).all(|j| {
+        let crossed = (0..pairs).find(|&j| {
             let (l, r) = (self.left[j], self.right[j]);
             let (l1, r1) = (self.left[(j + 1) % n], self.right[(j + 1) % n]);
-            orient(l, r, r1) >= 0.0 && orient(l, r1, l1) >= 0.0
-        })
+            orient(l, r, r1) < 0.0 || orient(l, r1, l1) < 0.0
+        })?;
+        Some((self.left[crossed] + self.right[crossed]) * 0.5)
     }
 }
 

@@ -1,0 +1,60 @@
+//! How true and how smooth the crest surfaces are, beside the figures that the method is known to reach:
+//! `cargo bench --bench surfaces`. Each cell reads "measured / tabled".
+
+#![allow(clippy::print_stdout, reason = "the table is what this command is for")]
+
+#[path = "../tests/shapes/mod.rs"]
+mod shapes;
+
+use shapes::measure::{CREASES, Measures, Method, Outline, Raised, crease, raise_all, summary};
+use shapes::{FINE, shapes};
+use std::time::Instant;
+
+fn main() {
+    println!("| shape | vertices | T | S | J |");
+    println!("|---|---|---|---|---|");
+    for shape in shapes(1) {
+        let counts = Raised::new(&shape, Outline::Own, f64::INFINITY, 0.05).counts();
+        print!("| {} |", shape.name);
+        for (got, tabled) in counts.iter().zip(shape.counts) {
+            if shape.is_tabled() {
+                print!(" {got} / {tabled} |");
+            } else {
+                print!(" {got} / - |");
+            }
+        }
+        println!();
+    }
+    let all = shapes(FINE);
+    println!(
+        "\n| outline | method | ring rms | ring max | S rms | plus rms | ridge | zmax | slope | plate | jump | faces | s |"
+    );
+    println!("|---|---|---|---|---|---|---|---|---|---|---|---|---|");
+    for (outline, name) in [(Outline::Own, "own"), (Outline::FourPoint, "four-point")] {
+        for method in Method::ALL {
+            let start = Instant::now();
+            let (each, faces) = raise_all(&all, outline, method);
+            let seconds = start.elapsed().as_secs_f64();
+            let each: Vec<_> = each
+                .iter()
+                .zip(&all)
+                .map(|((raised, patch), shape)| (shape.name, Measures::of(shape, raised, patch)))
+                .collect();
+            print!("| {name} | {} |", method.name());
+            for (got, tabled) in summary(&each).iter().zip(method.tabled()) {
+                match tabled {
+                    Some(tabled) => print!(" {got:.4} / {tabled} |"),
+                    None => print!(" {got:.4} / - |"),
+                }
+            }
+            println!(" {}k | {seconds:.2} |", faces / all.len() / 1000);
+        }
+    }
+    println!("\n| seam | shape | median, degrees | 95 % |");
+    println!("|---|---|---|---|");
+    for (seam, name, [median, most]) in CREASES {
+        let shape = all.iter().find(|s| s.name == name).expect("a known shape");
+        let [a, b] = crease(shape, seam).expect("the shape has such a seam");
+        println!("| {} | {name} | {a:.2} / {median} | {b:.2} / {most} |", seam.name());
+    }
+}

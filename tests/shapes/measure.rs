@@ -1,0 +1,396 @@
+//! Figures of merit of a surface: errors, ridge, slope, plate energy, jumps, creases.
+
+use super::Shape;
+use relievo::geom::{DVec2, DVec3, Grid};
+use relievo::job::{Profile, SkeletonSpec};
+use relievo::relief::rasterise;
+use relievo::skeleton::{Class, Sampled, cells, spine, triangulate};
+use relievo::surface::{
+    Fineness, Heights, Mesh, Patch, Ridge, Rungs, Skeleton, Window, ratio_field, rungs,
+};
+
+/// Width of the cells that surfaces are measured on.
+const CELL: f64 = 0.02;
+/// Distance of rungs, and parts of a half curve.
+const SPACING: f64 = 0.05;
+const HALF_CURVE: u32 = 16;
+/// Part of a seam that ends in a corner of the outline that belongs to the hip.
+const HIP: f64 = 0.05;
+
+/// The outline that a surface is raised over.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Outline {
+    /// The shape's own, as carved.
+    Own,
+    /// Four-point curves through the resampled vertices, as the tabled figures were measured.
+    FourPoint,
+}
+
+/// A shape taken apart and its ridge.
+#[derive(Debug)]
+pub(crate) struct Raised {
+    /// The parts of the shape.
+    pub(crate) skeleton: Skeleton,
+    /// What the ridge is made with.
+    pub(crate) ridge: Ridge,
+    /// Its heights over the spine.
+    pub(crate) heights: Heights,
+    fineness: Fineness,
+}
+
+impl Raised {
+    /// A shape with a ridge of height 1 over a base of 0.
+    pub(crate) fn new(shape: &Shape, outline: Outline, slope_cap: f64, spacing_mm: f64) -> Self {
+        let spec = SkeletonSpec { edge_mm: Some(shape.edge_mm), ..SkeletonSpec::default() };
+        let parts = f64::from(HALF_CURVE) * SPACING / spacing_mm;
+        let fineness = Fineness {
+            chord_mm: 0.02,
+            spacing_mm,
+            least_edge_mm: 2.0 * SPACING,
+            max_facet_mm: 0.25 / (parts * parts),
+        };
+        let mut skeleton = Skeleton::of(&shape.region, &spec, &fineness).expect("a sound shape");
+        if outline == Outline::FourPoint {
+            let sampled = Sampled::four_point(skeleton.sampled.rings(), spec.corner_rad);
+            let triangulation = triangulate(&sampled).expect("a sound shape");
+            let cells = cells(&sampled, &triangulation, &spec);
+            let rungs: Vec<_> =
+                cells.runs.iter().map(|run| rungs(&sampled, run, spacing_mm)).collect();
+            let lines: Vec<_> = rungs.iter().map(Rungs::midline).collect();
+            let spine = spine(&sampled, &cells, &lines);
+            let upright = rungs.iter().all(Rungs::upright);
+            skeleton = Skeleton { sampled, triangulation, cells, rungs, spine, upright };
+        }
+        let ridge = Ridge {
+            height_mm: 1.0,
+            base_mm: vec![0.0; shape.region.holes.len() + 1],
+            profile: Profile::Parabola,
+            slope_cap,
+            width_power: 0.0,
+            along: vec![],
+        };
+        let heights = ridge.heights(&skeleton.spine);
+        Self { skeleton, ridge, heights, fineness }
+    }
+
+    /// Its ruled mesh, checked.
+    pub(crate) fn mesh(&self) -> Mesh {
+        self.skeleton.mesh(&self.heights, &self.ridge, &self.fineness).expect("a sound mesh")
+    }
+
+    /// Numbers of vertices and of triangles of classes T, S and J.
+    pub(crate) fn counts(&self) -> [usize; 4] {
+        let t = &self.skeleton.triangulation;
+        let of = |class| (0..t.triangles.len()).filter(|&k| t.class(k) == class).count();
+        let n = self.skeleton.sampled.len();
+        [n, of(Class::Terminal), of(Class::Sleeve), of(Class::Junction)]
+    }
+
+    /// Its ratio field.
+    pub(crate) fn field(&self, shape: &Shape) -> Patch {
+        let grid = grid(shape);
+        let window = Window::whole(&grid);
+        let Self { skeleton, heights, ridge, .. } = self;
+        ratio_field(&shape.region, &skeleton.spine, heights, ridge, &grid, &window)
+    }
+
+    /// Largest distance of the surface from the height asked for, over the spine.
+    fn ridge_error(&self, shape: &Shape, patch: &Patch) -> f64 {
+        let grid = grid(shape);
+        let points = self.skeleton.spine.branches.iter().flat_map(|b| &b.points);
+        let error = |at: DVec2| {
+            let p = grid.to_grid(at);
+            let (i, j) = (p.x as usize, p.y as usize);
+            let part = p - p.floor();
+            let z = |i, j| f64::from(patch.at(i, j));
+            let row = |j| z(i, j) * (1.0 - part.x) + z(i + 1, j) * part.x;
+            (row(j) * (1.0 - part.y) + row(j + 1) * part.y - 1.0).abs()
+        };
+        points.map(|p| error(p.at)).filter(|e| e.is_finite()).fold(0.0, f64::max)
+    }
+}
+
+/// The grid that a shape is measured on.
+fn grid(shape: &Shape) -> Grid {
+    let bounds = shape.region.bounds();
+    let size = bounds.size() + DVec2::splat(4.0 * CELL);
+    Grid::covering(bounds.min - DVec2::splat(2.0 * CELL), size.x, size.y, CELL)
+        .expect("a small grid")
+}
+
+/// A mesh sampled on the grid of its shape.
+fn drawn(shape: &Shape, mesh: &Mesh) -> Patch {
+    rasterise(mesh, &grid(shape)).expect("a small mesh").patch
+}
+
+/// A surface of the table.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Method {
+    /// Ruled, a level ridge.
+    Ruled,
+    /// Ruled, the slope capped at 4.
+    Capped,
+    /// Ratio field.
+    Ratio,
+}
+
+impl Method {
+    /// All of them.
+    pub(crate) const ALL: [Self; 3] = [Self::Ruled, Self::Capped, Self::Ratio];
+
+    /// Its name in the table.
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::Ruled => "B+",
+            Self::Capped => "B+ slope cap 4",
+            Self::Ratio => "R ratio field",
+        }
+    }
+
+    /// Its row of the table, in the order of [`summary`].
+    pub(crate) fn tabled(self) -> [Option<f64>; 9] {
+        let row = match self {
+            Self::Ruled => [0.0008, 0.0014, 0.0033, 0.0007, 0.002, 1.0, 4.55, 60.5, 8.6],
+            Self::Capped => [0.0008, 0.0014, 0.0033, 0.0007, 0.0, 1.0, 2.74, 36.5, 8.1],
+            Self::Ratio => [0.0001, 0.0002, 0.0030, 0.0000, 0.001, 1.0, 4.39, 33.7, 7.6],
+        };
+        let mut row = row.map(Some);
+        if self == Self::Capped {
+            // The cap keeps the ridge low by design.
+            row[4] = None;
+        }
+        row
+    }
+}
+
+/// All shapes raised and drawn, and the number of triangles.
+pub(crate) fn raise_all(
+    all: &[Shape],
+    outline: Outline,
+    method: Method,
+) -> (Vec<(Raised, Patch)>, usize) {
+    let slope_cap = if method == Method::Capped { 4.0 } else { f64::INFINITY };
+    let mut faces = 0;
+    let raise = |shape: &Shape| {
+        let raised = Raised::new(shape, outline, slope_cap, SPACING);
+        if method == Method::Ratio {
+            let patch = raised.field(shape);
+            return (raised, patch);
+        }
+        let mesh = raised.mesh();
+        faces += mesh.faces.len();
+        (raised, drawn(shape, &mesh))
+    };
+    (all.iter().map(raise).collect(), faces)
+}
+
+/// What one surface measures.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Measures {
+    /// Root mean square and largest error where the exact height is known.
+    pub(crate) error: Option<[f64; 2]>,
+    /// Largest distance of the ridge from its height.
+    pub(crate) ridge: f64,
+    /// Highest point.
+    pub(crate) highest: f64,
+    /// 99.9th percentile of the slopes.
+    pub(crate) slope: f64,
+    /// Mean of the squared second derivatives.
+    pub(crate) plate: f64,
+    /// 99th percentile of the angle between neighbouring cells, degrees.
+    pub(crate) jump: f64,
+}
+
+impl Measures {
+    /// Measures the surface of a shape.
+    pub(crate) fn of(shape: &Shape, raised: &Raised, patch: &Patch) -> Self {
+        let grid = grid(shape);
+        let z = |i: usize, j: usize| f64::from(patch.at(i, j));
+        let mut errors = Vec::new();
+        let (mut bends, mut slopes, mut jumps) = (Vec::new(), Vec::new(), Vec::new());
+        let mut highest = 0.0_f64;
+        let corners = |i: usize, j: usize| [z(i, j), z(i + 1, j), z(i, j + 1), z(i + 1, j + 1)];
+        let slope = |i: usize, j: usize| {
+            let [a, b, c, d] = corners(i, j);
+            DVec2::new(b + d - a - c, c + d - a - b) / (2.0 * CELL)
+        };
+        for j in 1..grid.ny - 2 {
+            for i in 1..grid.nx - 2 {
+                if z(i, j).is_nan() {
+                    continue;
+                }
+                highest = highest.max(z(i, j));
+                if let Some(exact) = shape.exact.and_then(|exact| exact(grid.node(i, j))) {
+                    errors.push((z(i, j) - exact).abs());
+                }
+                let second = |di: usize, dj: usize| {
+                    (z(i + di, j + dj) + z(i - di, j - dj) - 2.0 * z(i, j)) / (CELL * CELL)
+                };
+                let mixed = z(i + 1, j + 1) + z(i - 1, j - 1) - z(i + 1, j - 1) - z(i - 1, j + 1);
+                let mixed = mixed / (4.0 * CELL * CELL);
+                let [xx, yy] = [second(1, 0), second(0, 1)];
+                bends.push(xx * xx + 2.0 * mixed * mixed + yy * yy);
+                slopes.push(slope(i, j).length());
+                let normal = |s: DVec2| DVec3::new(-s.x, -s.y, 1.0);
+                for (di, dj) in [(1, 0), (0, 1)] {
+                    let (a, b) = (normal(slope(i, j)), normal(slope(i + di, j + dj)));
+                    jumps.push(a.angle_between(b).to_degrees());
+                }
+            }
+        }
+        for figures in [&mut bends, &mut slopes, &mut jumps] {
+            figures.retain(|x| x.is_finite());
+        }
+        let rms = |e: &[f64]| (e.iter().map(|e| e * e).sum::<f64>() / e.len() as f64).sqrt();
+        let error =
+            (!errors.is_empty()).then(|| [rms(&errors), errors.iter().fold(0.0, |a, &e| e.max(a))]);
+        Self {
+            error,
+            ridge: raised.ridge_error(shape, patch),
+            highest,
+            slope: percentile(&mut slopes, 0.999),
+            plate: bends.iter().sum::<f64>() / bends.len() as f64,
+            jump: percentile(&mut jumps, 0.99),
+        }
+    }
+}
+
+/// The value below which this part of the figures lies; 0 when there are none.
+fn percentile(figures: &mut [f64], part: f64) -> f64 {
+    if figures.is_empty() {
+        return 0.0;
+    }
+    let k = (part * (figures.len() - 1) as f64) as usize;
+    *figures.select_nth_unstable_by(k, f64::total_cmp).1
+}
+
+/// Where two patches meet.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Seam {
+    /// Junction and sleeve.
+    JunctionSleeve,
+    /// The kites of one junction.
+    Kites,
+    /// Cap and sleeve.
+    CapSleeve,
+}
+
+impl Seam {
+    /// Its name in the table.
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::JunctionSleeve => "junction-sleeve",
+            Self::Kites => "junction-junction",
+            Self::CapSleeve => "cap-sleeve",
+        }
+    }
+}
+
+/// The table of creases: median and 95th percentile, degrees.
+pub(crate) const CREASES: [(Seam, &str, [f64; 2]); 7] = [
+    (Seam::JunctionSleeve, "plus", [0.4, 4.1]),
+    (Seam::JunctionSleeve, "wye", [0.1, 2.9]),
+    (Seam::JunctionSleeve, "tee", [6.0, 11.0]),
+    (Seam::JunctionSleeve, "star", [0.6, 3.2]),
+    (Seam::Kites, "star", [0.8, 1.6]),
+    (Seam::CapSleeve, "S", [0.2, 0.6]),
+    (Seam::CapSleeve, "C-scroll", [0.4, 35.0]),
+];
+
+/// Median and 95th percentile of the angle between the normals on both sides of a kind of seam, degrees;
+/// `None` when the shape has none.
+///
+/// The facets' own bends, which halve with their size, are taken out by measuring at two sizes. The ends of
+/// a seam at corners of the outline are left out: the hip there is meant, and the triangles round it turn by
+/// as much however small they are.
+pub(crate) fn crease(shape: &Shape, seam: Seam) -> Option<[f64; 2]> {
+    let (coarse, fine) =
+        (crease_at(shape, seam, 0.5 * SPACING)?, crease_at(shape, seam, 0.25 * SPACING)?);
+    Some([0, 1].map(|k| (2.0 * fine[k] - coarse[k]).max(0.0)))
+}
+
+fn crease_at(shape: &Shape, seam: Seam, spacing_mm: f64) -> Option<[f64; 2]> {
+    let raised = Raised::new(shape, Outline::FourPoint, f64::INFINITY, spacing_mm);
+    let (mesh, skeleton) = (raised.mesh(), &raised.skeleton);
+    let at = |v: u32| skeleton.sampled.at(v);
+    let side = |from: u32, to: u32| {
+        let (a, b) = (at(from), at(to));
+        let hip = |v: u32| if skeleton.sampled.corner[v as usize] { HIP } else { 0.0 };
+        [a.lerp(b, hip(from)), b.lerp(a, hip(to))]
+    };
+    let mut lines: Vec<[DVec2; 2]> = Vec::new();
+    match seam {
+        Seam::JunctionSleeve => {
+            let runs = &skeleton.cells.runs;
+            let ends = runs.iter().filter(|r| !r.closed);
+            let ends: Vec<[u32; 2]> =
+                ends.flat_map(|r| [r.edges[0], r.edges[r.edges.len() - 1]]).collect();
+            for junction in &skeleton.cells.junctions {
+                let poly = &junction.poly;
+                let sides = poly.iter().zip(poly.iter().cycle().skip(1));
+                let open =
+                    sides.filter(|&(&a, &b)| ends.contains(&[a, b]) || ends.contains(&[b, a]));
+                lines.extend(open.map(|(&a, &b)| side(a, b)));
+            }
+        }
+        Seam::Kites => {
+            for junction in &skeleton.cells.junctions {
+                let poly = &junction.poly;
+                let sides = poly.iter().zip(poly.iter().cycle().skip(1));
+                lines.extend(sides.map(|(&a, &b)| [(at(a) + at(b)) * 0.5, junction.centre]));
+            }
+        }
+        Seam::CapSleeve => {
+            for cap in skeleton.cells.caps.iter().filter(|cap| !cap.closed) {
+                lines.push(side(cap.chain[0], cap.chain[cap.chain.len() - 1]));
+            }
+        }
+    }
+    let mut angles = angles_along(&mesh, &lines);
+    (!angles.is_empty()).then(|| [0.5, 0.95].map(|part| percentile(&mut angles, part)))
+}
+
+/// Angles between the triangles on both sides of the mesh's edges that lie on the lines, degrees.
+fn angles_along(mesh: &Mesh, lines: &[[DVec2; 2]]) -> Vec<f64> {
+    let on = |p: DVec2, [a, b]: [DVec2; 2]| {
+        let along = (b - a).normalize();
+        let t = (p - a).dot(along);
+        (p - a).perp_dot(along).abs() < 1e-9 && (-1e-9..=a.distance(b) + 1e-9).contains(&t)
+    };
+    let mut sides = std::collections::BTreeMap::new();
+    for face in &mesh.faces {
+        let [a, b, c] = face.map(|v| mesh.vertices[v as usize]);
+        let normal = (b - a).cross(c - a);
+        for k in 0..3 {
+            let edge = [face[k], face[(k + 1) % 3]];
+            let ends = edge.map(|v| mesh.vertices[v as usize].truncate());
+            if lines.iter().any(|&line| ends.iter().all(|&p| on(p, line))) {
+                sides.insert(edge, normal);
+            }
+        }
+    }
+    let pairs = sides.iter().filter(|(e, _)| e[0] < e[1]);
+    let pairs = pairs.filter_map(|(e, one)| Some((one, sides.get(&[e[1], e[0]])?)));
+    pairs.map(|(one, two)| one.angle_between(*two).to_degrees()).collect()
+}
+
+/// The row of the table: ring rms and max, S rms, plus rms, then ridge, highest point, slope, plate
+/// energy (geometric mean) and jump over all shapes.
+pub(crate) fn summary(each: &[(&str, Measures)]) -> [f64; 9] {
+    let n = each.len() as f64;
+    let error = |name: &str| {
+        each.iter().find(|e| e.0 == name).and_then(|e| e.1.error).unwrap_or([f64::NAN; 2])
+    };
+    let mean = |of: fn(&Measures) -> f64| each.iter().map(|e| of(&e.1)).sum::<f64>() / n;
+    [
+        error("ring")[0],
+        error("ring")[1],
+        error("S")[0],
+        error("plus")[0],
+        mean(|m| m.ridge),
+        each.iter().map(|e| e.1.highest).fold(0.0, f64::max),
+        mean(|m| m.slope),
+        libm::exp(mean(|m| libm::log(m.plate))),
+        mean(|m| m.jump),
+    ]
+}

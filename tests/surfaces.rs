@@ -1,0 +1,89 @@
+//! The crest surfaces over the eight test shapes of the specification, held against its tables:
+//! `cargo bench --bench surfaces` prints the same figures.
+
+mod shapes;
+
+use relievo::geom::DVec2;
+use relievo::outline::Region;
+use shapes::measure::{CREASES, Measures, Method, Outline, Raised, crease, raise_all, summary};
+use shapes::{FINE, Shape, shapes, solid};
+
+/// A figure counts as reproduced when it is off by no more than this part.
+const WITHIN: f64 = 0.2;
+/// Half of the last digit of the tabled errors.
+const DIGIT: f64 = 5e-5;
+
+#[test]
+fn the_shapes_are_triangulated_as_tabled() {
+    for shape in shapes(1).iter().filter(|s| s.is_tabled()) {
+        let counts = Raised::new(shape, Outline::Own, f64::INFINITY, 0.05).counts();
+        for (got, tabled) in counts.into_iter().zip(shape.counts) {
+            assert!(got.abs_diff(tabled) * 10 <= tabled, "{}: {counts:?}", shape.name);
+        }
+        let [n, t, s, j] = counts;
+        let holes = shape.region.holes.len();
+        assert_eq!((2 * t + s, j + 2), (n, t + 2 * holes), "{}", shape.name);
+    }
+}
+
+#[test]
+fn surfaces_are_as_true_and_as_smooth_as_tabled() {
+    let all = shapes(FINE);
+    for outline in [Outline::Own, Outline::FourPoint] {
+        for method in Method::ALL {
+            let (each, _) = raise_all(&all, outline, method);
+            let measured: Vec<_> = each
+                .iter()
+                .zip(&all)
+                .map(|((raised, patch), shape)| (shape.name, Measures::of(shape, raised, patch)))
+                .collect();
+            let got = summary(&measured);
+            for (k, tabled) in method.tabled().into_iter().enumerate() {
+                let Some(tabled) = tabled else { continue };
+                let most = tabled * (1.0 + WITHIN) + DIGIT;
+                assert!(
+                    got[k] <= most,
+                    "{outline:?} {} figure {k}: {} / {tabled}",
+                    method.name(),
+                    got[k]
+                );
+                // The highest point and the slope are no errors: less is not better.
+                let least = if k == 5 || k == 6 { tabled * (1.0 - WITHIN) } else { 0.0 };
+                assert!(got[k] >= least, "{outline:?} {} figure {k}: {}", method.name(), got[k]);
+            }
+        }
+    }
+}
+
+#[test]
+fn patches_meet_as_smoothly_as_tabled() {
+    let all = shapes(FINE);
+    for (seam, name, tabled) in CREASES {
+        let shape: &Shape = all.iter().find(|s| s.name == name).unwrap();
+        let got = crease(shape, seam).unwrap();
+        for (got, tabled) in got.into_iter().zip(tabled) {
+            // What is left of the facets' own bends is below half a degree.
+            assert!(
+                got <= tabled * (1.0 + WITHIN) + 0.5,
+                "{} {name}: {got} / {tabled}",
+                seam.name()
+            );
+        }
+    }
+}
+
+/// Long and thin: 20 x 0.4.
+fn strip() -> Region {
+    solid([[0.0, 0.0], [20.0, 0.0], [20.0, 0.4], [0.0, 0.4]].map(DVec2::from).to_vec())
+}
+
+#[test]
+fn a_long_thin_strip_is_raised() {
+    let shape = Shape { name: "strip", edge_mm: 0.3, region: strip(), counts: [0; 4], exact: None };
+    let raised = Raised::new(&shape, Outline::Own, 4.0, 0.05);
+    let mesh = raised.mesh();
+    mesh.check().unwrap();
+    // A slope of 4 over half a width of 0.2 mm, as the parabola has it: h = 4 * 0.2 / 2.
+    let top = mesh.vertices.iter().map(|v| v.z).fold(0.0, f64::max);
+    assert!((top - 0.4).abs() < 1e-9, "{top}");
+}
