@@ -43,7 +43,7 @@ fn row(points: u32) {
     let spec =
         SkeletonSpec { edge_mm: Some(around / f64::from(points)), ..SkeletonSpec::default() };
     let limits = SampleLimits { chord_mm: 0.02, least_edge_mm: 0.001 };
-    let (sampled, _) = sample(&region, &spec, &limits).expect("a sound figure");
+    let (sampled, _, _) = sample(&region, &spec, &limits).expect("a sound figure");
     let (triangles_ms, triangulation) = best_ms(|| triangulate(&sampled).expect("a sound figure"));
     let (cells_ms, _) = best_ms(|| {
         let cells = cells(&sampled, &triangulation, &spec);

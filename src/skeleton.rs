@@ -38,25 +38,25 @@ pub enum SkeletonError {
     #[error("a vertex of the outline is no usable number")]
     NotFinite,
     /// Two edges of the resampled outline cross or touch.
-    #[error("the outline crosses itself at {at}")]
+    #[error("the outline crosses itself at {at:.2}")]
     Crossing {
         /// Where, mm.
         at: DVec2,
     },
     /// A ring is nothing but a point or a line.
-    #[error("the ring at {at} has no area")]
+    #[error("the ring at {at:.2} has no area")]
     NoArea {
         /// Its first vertex, mm.
         at: DVec2,
     },
     /// A hole lies outside the outer ring or in another hole.
-    #[error("the hole at {at} does not lie directly inside the outline")]
+    #[error("the hole at {at:.2} does not lie directly inside the outline")]
     HoleMisplaced {
         /// Its first vertex, mm.
         at: DVec2,
     },
     /// The triangles inside the outline do not hang together as they must (an identity fails).
-    #[error("the triangles of the figure at {at} do not fit together")]
+    #[error("the triangles of the figure at {at:.2} do not fit together")]
     Disconnected {
         /// A vertex of the figure, mm.
         at: DVec2,

@@ -4,7 +4,10 @@
 //! The curve between the vertices is the artwork's own polyline, so a surface whose rim follows
 //! [`Sampled::curves`] lies on the artwork to within the chords of its own rim.
 
-use super::{Class, Curve, Sampled, SkeletonError, Triangulation, triangulate, turn};
+use super::{
+    Cells, Class, Curve, NO_TRIANGLE, Sampled, SkeletonError, Triangulation, cells, triangulate,
+    turn,
+};
 use crate::geom::{DVec2, distance_to_segment, orient, perimeter, signed_area};
 use crate::job::SkeletonSpec;
 use crate::outline::{Region, meeting_edges};
@@ -36,11 +39,12 @@ pub struct SampleLimits {
     pub least_edge_mm: f64,
 }
 
-/// Resamples the rings of a region and triangulates them.
+/// Resamples the rings of a region, triangulates them and takes the triangles apart (see [`cells`]).
 ///
 /// Rings are split at their corners, and each piece into even steps of about `spec.edge_mm` along the
 /// curve (area over perimeter when not given), at least 24 a ring. Edges are then split where they stray
-/// from the curve, where they meet others, and where the figure is narrower than they are long.
+/// from the curve, where they meet others, where the figure is narrower than they are long, and where the
+/// curve between them wiggles across the triangles.
 ///
 /// # Errors
 /// [`SkeletonError`] with the place: a coordinate that is no number, a ring without area, edges that
@@ -49,7 +53,7 @@ pub fn sample(
     region: &Region,
     spec: &SkeletonSpec,
     limits: &SampleLimits,
-) -> Result<(Sampled, Triangulation), SkeletonError> {
+) -> Result<(Sampled, Triangulation, Cells), SkeletonError> {
     let size = region.bounds().size().length();
     if !region.rings().flatten().all(|p| p.is_finite()) {
         return Err(SkeletonError::NotFinite);
@@ -68,12 +72,17 @@ pub fn sample(
         make_simple(&mut rings)?;
         let sampled = assemble(&rings);
         let triangulation = triangulate(&sampled)?;
-        let stray = straying(&rings, &triangulation, sampled.len());
-        let long = too_long(&sampled, &triangulation, limits.least_edge_mm);
-        if round == ROUNDS || (long.is_empty() && stray.is_empty()) {
-            return Ok((sampled, triangulation));
+        let mut stray = straying(&rings, &apexes(&sampled, &triangulation));
+        let mut more = too_long(&sampled, &triangulation, limits.least_edge_mm);
+        let last = round == ROUNDS;
+        if last || (more.is_empty() && stray.is_empty()) {
+            let cells = cells(&sampled, &triangulation, spec);
+            // Limbs that were cut back have given their edges new triangles.
+            stray = straying(&rings, &poles(&sampled, &cells));
+            if last || stray.is_empty() {
+                return Ok((sampled, triangulation, cells));
+            }
         }
-        let mut more = long.clone();
         more.extend(&stray);
         more.sort_unstable();
         more.dedup();
@@ -281,25 +290,52 @@ fn assemble(rings: &[Marks]) -> Sampled {
     sampled
 }
 
-/// The outline's edges whose curve leaves the wedge of its triangle (it crosses the line of one of the inner
-/// edges beside it, as where that edge touches a hollow): rungs could not stand on it. Ascending.
-fn straying(rings: &[Marks], triangulation: &Triangulation, n: usize) -> Vec<usize> {
-    // The vertex opposite each edge of the outline.
-    let mut apex = vec![None; n];
+/// The point opposite each edge of the outline in its triangle, by the edge's start.
+fn apexes(sampled: &Sampled, triangulation: &Triangulation) -> Vec<Option<DVec2>> {
+    let mut apex = vec![None; sampled.len()];
     for (triangle, neighbours) in triangulation.triangles.iter().zip(&triangulation.neighbours) {
-        for k in (0..3).filter(|&k| neighbours[k] == super::NO_TRIANGLE) {
-            apex[triangle[k] as usize] = Some(triangle[(k + 2) % 3] as usize);
+        for k in (0..3).filter(|&k| neighbours[k] == NO_TRIANGLE) {
+            apex[triangle[k] as usize] = Some(sampled.at(triangle[(k + 2) % 3]));
         }
     }
+    apex
+}
+
+/// The same for what pruning made of the triangles: poles of caps and centres of hubs for their chains.
+fn poles(sampled: &Sampled, cells: &Cells) -> Vec<Option<DVec2>> {
+    let mut apex = vec![None; sampled.len()];
+    for sleeve in &cells.sleeves {
+        apex[sleeve.from as usize] = Some(sampled.at(sleeve.apex));
+    }
+    let caps = cells.caps.iter().map(|cap| (cap.pole, &cap.chain, cap.closed));
+    let hubs = cells.hubs.iter().map(|hub| (hub.centre, &hub.chain, false));
+    for (pole, chain, closed) in caps.chain(hubs) {
+        let ends_open = usize::from(!closed);
+        for &v in &chain[..chain.len() - ends_open] {
+            apex[v as usize] = Some(pole);
+        }
+    }
+    apex
+}
+
+/// The outline's edges whose curve does not turn on all the way round the point opposite: it crosses an
+/// inner edge (as where that touches a hollow) or wiggles, and rungs would cross on it. Ascending.
+fn straying(rings: &[Marks], apex: &[Option<DVec2>]) -> Vec<usize> {
     let at: Vec<DVec2> = rings.iter().flat_map(Marks::points).collect();
     let (mut stray, mut first) = (Vec::new(), 0);
     for marks in rings {
         let count = marks.places.len();
         for k in 0..count {
             let (v, w) = (first + k, first + (k + 1) % count);
-            let Some(apex) = apex[v].map(|a: usize| at[a]) else { continue };
-            let within = |p: DVec2| orient(at[w], apex, p) >= 0.0 && orient(apex, at[v], p) >= 0.0;
-            if !marks.between(marks.places[k], marks.after(k)).all(|(_, p)| within(p)) {
+            let Some(apex) = apex[v] else { continue };
+            let mut before = at[v];
+            let between = marks.between(marks.places[k], marks.after(k)).map(|(_, p)| p);
+            let turns_on = between.chain([at[w]]).all(|p| {
+                let on = orient(apex, before, p) >= 0.0;
+                before = p;
+                on
+            });
+            if !turns_on {
                 stray.push(v);
             }
         }
@@ -320,7 +356,7 @@ fn too_long(sampled: &Sampled, triangulation: &Triangulation, least_edge_mm: f64
             let (a, b) = (triangle[k], triangle[(k + 1) % 3]);
             (a, sampled.at(a).distance(sampled.at(b)))
         });
-        let outer = (0..3).find(|&k| triangulation.neighbours[t][k] == super::NO_TRIANGLE);
+        let outer = (0..3).find(|&k| triangulation.neighbours[t][k] == NO_TRIANGLE);
         let Some((from, length)) = outer.map(|k| sides[k]) else { continue };
         let inner: f64 = sides.iter().map(|s| s.1).sum::<f64>() - length;
         if length > LONG * 0.5 * inner && sampled.edge_length(from) >= 2.0 * least_edge_mm {

@@ -51,7 +51,7 @@ fn edges_that_stray_are_split_at_the_seam_of_the_ring_too() {
         region.outer.rotate_left(turn);
         for corner_rad in [0.9, f64::INFINITY] {
             let spec = SkeletonSpec { corner_rad, ..SkeletonSpec::default() };
-            let (sampled, triangulation) = sample(&region, &spec, &limits).unwrap();
+            let (sampled, triangulation, _) = sample(&region, &spec, &limits).unwrap();
             assert!(triangulation.identities_hold(sampled.len(), 0));
             let curve = &sampled.curves[0];
             for k in 0..sampled.len() {

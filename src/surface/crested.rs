@@ -13,8 +13,8 @@ use crate::geom::{Grid, Tolerance};
 use crate::job::{CrestSpec, LayerSpec, SkeletonSpec};
 use crate::outline::{Figure, Region};
 use crate::skeleton::{
-    Cells, SampleLimits, Sampled, SkeletonError, Spine, Triangulation, cells, midlines, sample,
-    smooth, spine,
+    Cells, SampleLimits, Sampled, SkeletonError, Spine, Triangulation, midlines, sample, smooth,
+    spine,
 };
 use rayon::prelude::*;
 
@@ -80,8 +80,7 @@ impl Skeleton {
     ) -> Result<Self, SkeletonError> {
         let limits =
             SampleLimits { chord_mm: fineness.chord_mm, least_edge_mm: fineness.least_edge_mm };
-        let (sampled, triangulation) = sample(region, spec, &limits)?;
-        let cells = cells(&sampled, &triangulation, spec);
+        let (sampled, triangulation, cells) = sample(region, spec, &limits)?;
         let rungs: Vec<Rungs> =
             cells.runs.par_iter().map(|run| rungs(&sampled, run, fineness.spacing_mm)).collect();
         let upright = rungs.iter().all(Rungs::upright);

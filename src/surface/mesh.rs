@@ -35,7 +35,7 @@ pub enum MeshError {
         count: usize,
     },
     /// A face names a vertex twice.
-    #[error("face {face} of the mesh, at {at}, names a vertex twice")]
+    #[error("face {face} of the mesh, at {at:.2}, names a vertex twice")]
     Repeated {
         /// Index of the face.
         face: usize,
@@ -43,7 +43,7 @@ pub enum MeshError {
         at: DVec2,
     },
     /// A face runs clockwise seen from above.
-    #[error("a triangle of the mesh at {at} is turned over (area {area_mm2} mm2)")]
+    #[error("a triangle of the mesh at {at:.2} is turned over (area {area_mm2:.2e} mm2)")]
     Clockwise {
         /// Index of the face.
         face: usize,
@@ -53,7 +53,7 @@ pub enum MeshError {
         area_mm2: f64,
     },
     /// Two faces run along an edge in the same direction: they overlap or the orientation changes.
-    #[error("two triangles of the mesh lie on the same side of the edge at {at}")]
+    #[error("two triangles of the mesh lie on the same side of the edge at {at:.2}")]
     EdgeUsedTwice {
         /// Indices of the two vertices of the edge.
         edge: [u32; 2],

@@ -324,16 +324,18 @@ fn turns_on(pole: DVec2, a: DVec2, b: DVec2) -> bool {
 #[non_exhaustive]
 pub enum RuledFault {
     /// Rungs across a limb cross each other.
-    #[error("the rungs across the figure at {at} cross")]
+    #[error("the rungs across the figure at {at:.2} cross")]
     CrossingRungs {
-        /// A vertex of the figure, mm.
+        /// The middle of the first one that crosses the next, mm.
         at: DVec2,
     },
     /// The mesh has a fault: a triangle is turned over, or two lie on the same side of an edge.
     #[error("{0}")]
     Mesh(MeshError),
     /// The rim of the mesh is not on the outline's height: there is a gap between two patches.
-    #[error("the rim of the mesh at {at} lies at z = {z_mm} mm, the outline at {base_mm} mm")]
+    #[error(
+        "the rim of the mesh at {at:.2} lies at z = {z_mm:.4} mm, the outline at {base_mm:.4} mm"
+    )]
     Gap {
         /// Where, mm.
         at: DVec2,
@@ -343,7 +345,7 @@ pub enum RuledFault {
         base_mm: f64,
     },
     /// The mesh does not cover the figure, or covers more.
-    #[error("the mesh covers {mesh_mm2} mm2 of a figure of {figure_mm2} mm2")]
+    #[error("the mesh covers {mesh_mm2:.4} mm2 of a figure of {figure_mm2:.4} mm2")]
     Area {
         /// Area of the mesh in plan, mm2.
         mesh_mm2: f64,
