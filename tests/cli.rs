@@ -123,6 +123,22 @@ fn a_job_file_gives_all_outputs() {
 }
 
 #[test]
+fn debug_pictures_show_the_skeletons_of_layers_with_a_crest() {
+    let desk = leaf_desk();
+    let job = LEAF_JOB.replace("height_mm = 3.5", "height_mm = 3.5\nsurface = \"profile\"");
+    desk.put("leaf.toml", &job);
+    let out = desk.run(&["carve", "leaf.toml", "--debug-pictures"]);
+    assert_eq!(out.status.code(), Some(0), "{}", stderr(&out));
+    let files = desk.files();
+    let drawing = String::from_utf8(files["leaf-carving/skeleton-1.svg"].clone()).unwrap();
+    for part in ["<svg", "rungs", "spine", "sleeve triangles", "</svg>"] {
+        assert!(drawing.contains(part), "{part}");
+    }
+    // The second layer has no crest.
+    assert!(!files.contains_key("leaf-carving/skeleton-2.svg"));
+}
+
+#[test]
 fn programs_are_grbl_clean() {
     let desk = leaf_desk();
     assert_eq!(desk.run(&["carve", "leaf.toml"]).status.code(), Some(0));

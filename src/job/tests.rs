@@ -389,3 +389,34 @@ fn words_in_the_table_are_those_of_the_types() {
         assert_eq!(job(&text).unwrap().layers[0].combine, combine);
     }
 }
+
+/// Every key of a crest surface arrives, and those left out have the defaults of appendix A.
+#[test]
+fn crest_surfaces_are_read() {
+    let layer = |surface: &str| {
+        let text = format!("[[layer]]\nselect = \"all\"\nsurface = {surface}\n");
+        job(&with(&text)).unwrap().layers.remove(0).surface
+    };
+    let SurfaceSpec::Ruled(plain) = layer("\"ruled\"") else { panic!("it is ruled") };
+    assert_eq!(plain, CrestSpec::default());
+    assert_eq!((plain.profile, plain.width_power), (Profile::Parabola, 0.0));
+    let skeleton = plain.skeleton;
+    assert_eq!(skeleton.prune, Prune::InscribedDisc { delta: 0.15 });
+    assert!((skeleton.corner_rad.to_degrees() - 50.0).abs() < 1e-9);
+    assert_eq!((skeleton.split, skeleton.join), (Split::Sleeves, Join::Clusters));
+    assert_eq!((skeleton.edge_mm, skeleton.significance), (None, None));
+
+    let all = "{ method = \"ratio\", profile = \"round\", width_power = 0.5, \
+               along = [[0, 1], [0.5, 1.2], [1, 0.4]], hole_base_mm = 0.5, edge_mm = 2, corner_deg = 40, \
+               prune = \"half-disc\", junctions = \"teddy\", join = \"pairs\", significance = 0.2 }";
+    let SurfaceSpec::Ratio(crest) = layer(all) else { panic!("it is a ratio field") };
+    assert_eq!((crest.profile, crest.width_power), (Profile::Round, 0.5));
+    assert_eq!(crest.along, [[0.0, 1.0], [0.5, 1.2], [1.0, 0.4]]);
+    assert_eq!(crest.hole_base_mm, Some(0.5));
+    assert_eq!(crest.skeleton.edge_mm, Some(2.0));
+    assert!((crest.skeleton.corner_rad.to_degrees() - 40.0).abs() < 1e-9);
+    assert_eq!(crest.skeleton.prune, Prune::HalfDisc);
+    assert_eq!((crest.skeleton.split, crest.skeleton.join), (Split::Teddy, Join::Pairs));
+    let significance = Some(Significance { abs_mm: None, rel: 0.2 });
+    assert_eq!(crest.skeleton.significance, significance);
+}

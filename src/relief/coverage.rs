@@ -1,7 +1,7 @@
 //! Exact area coverage: how much of each node's cell lies inside an outline.
 
 use crate::geom::{DVec2, Grid};
-use crate::surface::Window;
+use crate::surface::{FINE, Window, finer, inside_spans};
 
 /// The fraction (0..=1) of each node's cell that lies inside `rings`, row-major over the window. The
 /// cell is the square of one pitch with the node in its middle.
@@ -34,6 +34,32 @@ pub fn coverage<'a>(
         }
     }
     sums.sum
+}
+
+/// Which of the [`FINE`] x [`FINE`] samples of each node's cell lie inside `rings`, a bit for each, row-major
+/// over the window. Figures that share a border share no sample.
+pub(super) fn samples<'a>(
+    rings: impl IntoIterator<Item = &'a [DVec2]>,
+    grid: &Grid,
+    window: &Window,
+) -> Vec<u16> {
+    let mut masks = vec![0_u16; window.len()];
+    let Window { i0, j0, nx, ny } = *window;
+    let fine = Window { i0: i0 * FINE, j0: j0 * FINE, nx: nx * FINE, ny: ny * FINE };
+    for (j, spans) in inside_spans(rings, &finer(grid), &fine).iter().enumerate() {
+        let (row, shift) = (j / FINE * nx, j % FINE * FINE);
+        for &(first, end) in spans {
+            let (first, end) = (first as usize, end as usize);
+            for i in first / FINE..end.div_ceil(FINE) {
+                // Samples of this cell before the span begins, and after it ends.
+                let before = first.saturating_sub(i * FINE);
+                let after = ((i + 1) * FINE).saturating_sub(end);
+                let bits = (0b1111_u16 >> after) & (0b1111 << before);
+                masks[row + i] |= bits << shift;
+            }
+        }
+    }
+    masks
 }
 
 /// The change of coverage from each cell to the next along its row.

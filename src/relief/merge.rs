@@ -10,11 +10,19 @@
 //!   a  = coverage of the cell by the figures, at most 1 (or the feather's weight)
 //!   c <- c + a (op(c, l) - c)
 //! ```
+//!
+//! In cells that the layers below cover in part (A), c is the mean of their height q = c / A and of the bare
+//! ground at 0; the part of a that lies on bare ground is told by samples of the cell, so that outlines that
+//! share a border leave no groove between them:
+//!
+//! ```text
+//!   c <- c + (a - u) (op(q, l) - q) + u op(0, l)      u = a x (share of the layer's samples not covered yet)
+//! ```
 //! Smooth seams: the bulge of max and min is scaled by `min(1, d/k)`, d = distance inside the upper
 //! outline or inside the outlines below, whichever is less, so that it vanishes on both.
 
 use super::combine::{feather_weight, joined};
-use super::coverage::coverage;
+use super::coverage::{coverage, samples};
 use super::raster::{Bands, rasterise, window_of};
 use super::{Relief, ReliefError};
 use crate::geom::{Bounds, DVec2, Grid, Heightfield};
@@ -31,6 +39,8 @@ use std::collections::BTreeSet;
 const BAND: usize = 32;
 /// Coverage closer to 0 or 1 than this is 0 or 1: rounding of the running sums.
 const COVERAGE_ROUNDING: f64 = 1e-9;
+/// The same for sums of several layers, in single precision.
+const COVERED_ROUNDING: f64 = 1e-6;
 /// Heights that leave the stock by less than this are rounding of `f32` and put level with it, mm.
 const LEVEL_MM: f64 = 1e-5;
 /// Share of a layer's area that may be thinner than a cell (the tips of its figures) without a note.
@@ -131,8 +141,37 @@ struct Layer<'a> {
     spec: &'a LayerSpec,
     bodies: Vec<Body<'a>>,
     outline_mm: f64,
+    /// Where holes have a height of their own.
+    holes: Option<Holes>,
     feathered: bool,
     blended: bool,
+}
+
+/// Outlines and holes of a layer whose holes have a height of their own.
+#[derive(Debug)]
+struct Holes {
+    outer: Segments,
+    inner: Segments,
+    base_mm: f64,
+}
+
+impl Holes {
+    fn of(spec: &LayerSpec, figures: &[Figure]) -> Option<Self> {
+        let (SurfaceSpec::Ruled(crest) | SurfaceSpec::Ratio(crest)) = &spec.surface else {
+            return None;
+        };
+        let base_mm = crest.hole_base_mm.filter(|&mm| mm != spec.base_mm)?;
+        let base_mm = if spec.draft_rad > 0.0 { base_mm.min(0.0) } else { base_mm };
+        let regions = || figures.iter().flat_map(|f| &f.regions);
+        let outer = Segments::of_rings(regions().map(|r| r.outer.as_slice()));
+        let inner = Segments::of_rings(regions().flat_map(|r| r.holes.iter().map(Vec::as_slice)));
+        (!inner.is_empty()).then_some(Self { outer, inner, base_mm })
+    }
+
+    /// True when a hole is nearer than an outline.
+    fn nearer(&self, p: DVec2) -> bool {
+        self.inner.distance(p) < self.outer.distance(p)
+    }
 }
 
 /// Rasterises the meshes and finds out who needs distances.
@@ -172,6 +211,7 @@ fn prepare<'a>(
             spec,
             bodies: Vec::with_capacity(bodies.len()),
             outline_mm: outline_height(spec),
+            holes: Holes::of(spec, &outlines.layers[index].figures),
             feathered,
             blended: blended(spec),
         };
@@ -252,7 +292,11 @@ struct Band<'a> {
     /// The present layer: heights (NaN: none), coverage, distance inside its outlines.
     height: Vec<f32>,
     cover: Vec<f32>,
+    samples: Vec<u16>,
     depth: Vec<f32>,
+    /// The layers so far: coverage and samples of each cell.
+    covered: Vec<f32>,
+    taken: Vec<u16>,
     /// Largest distance inside an outline of the layers below; empty when no layer is blended.
     below: Vec<f32>,
     /// For each layer: covered cells in parts of figures so thin that no node lies inside nearby.
@@ -278,6 +322,9 @@ impl<'a> Band<'a> {
             marks,
             height: field(true, f32::NAN),
             cover: field(true, 0.0),
+            samples: vec![0; n],
+            covered: field(true, 0.0),
+            taken: vec![0; n],
             depth: field(measured, 0.0),
             below: field(blended, 0.0),
             thin: vec![0.0; layers.len()],
@@ -308,6 +355,7 @@ impl<'a> Band<'a> {
             let run = self.at(i0, j)..self.at(i1, j);
             self.height[run.clone()].fill(f32::NAN);
             self.cover[run.clone()].fill(0.0);
+            self.samples[run.clone()].fill(0);
             if !self.depth.is_empty() {
                 self.depth[run].fill(0.0);
             }
@@ -337,6 +385,12 @@ impl<'a> Band<'a> {
         let window = self.rows_of(&body.window);
         if window.is_empty() {
             return;
+        }
+        for (row, mask) in
+            samples(body.rings(), &self.grid, &window).chunks_exact(window.nx).enumerate()
+        {
+            let at = self.at(window.i0, window.j0 + row);
+            self.samples[at..at + window.nx].iter_mut().zip(mask).for_each(|(out, m)| *out |= m);
         }
         let cover = coverage(body.rings(), &self.grid, &window);
         for (row, cover) in cover.chunks_exact(window.nx).enumerate() {
@@ -370,6 +424,41 @@ impl<'a> Band<'a> {
         }
     }
 
+    /// How much of cell `k` was covered before the present layer, and how much bare ground of it the layer
+    /// covers; adds that to what is covered.
+    fn cover_more(&mut self, k: usize) -> (f64, f64) {
+        let (cover, covered) = (f64::from(self.cover[k]), f64::from(self.covered[k]));
+        let (own, taken) = (self.samples[k], self.taken[k]);
+        let bare = if own == 0 {
+            // Too small a part for a sample: as likely anywhere.
+            1.0 - covered
+        } else {
+            f64::from((own & !taken).count_ones()) / f64::from(own.count_ones())
+        };
+        let fresh = (cover * bare).clamp((cover - covered).max(0.0), cover.min(1.0 - covered));
+        self.taken[k] |= own;
+        let sum = covered + fresh;
+        self.covered[k] = if sum > 1.0 - COVERED_ROUNDING { 1.0 } else { sum as f32 };
+        (covered, fresh)
+    }
+
+    /// The same for a layer that is the new ground wherever it has a height.
+    fn set_ground(&mut self, k: usize) -> (f64, f64) {
+        let covered = f64::from(self.covered[k]);
+        if self.height[k].is_nan() {
+            return (covered, 0.0);
+        }
+        (self.covered[k], self.taken[k]) = (1.0, u16::MAX);
+        (covered, 1.0 - covered)
+    }
+
+    /// Height of the layer's outline nearest to node `k` of the band.
+    fn outline_mm(&self, k: usize, layer: &Layer) -> f64 {
+        let p = self.grid.node(k % self.grid.nx, self.window.j0 + k / self.grid.nx);
+        let hole = layer.holes.as_ref().filter(|holes| holes.nearer(p));
+        hole.map_or(layer.outline_mm, |holes| holes.base_mm)
+    }
+
     /// Joins the present layer to what is below it at node `k` of the band.
     fn join(&mut self, k: usize, index: usize, layer: &Layer) {
         let (height, cover) = (self.height[k], f64::from(self.cover[k]));
@@ -387,11 +476,21 @@ impl<'a> Band<'a> {
         let blend_mm = if layer.blended { layer.spec.blend_mm } else { 0.0 };
         let below = self.below.get(k).map_or(0.0, |&d| f64::from(d));
         let fade = if layer.blended { (depth.min(below) / blend_mm).min(1.0) } else { 0.0 };
-        let c = f64::from(self.z[k]);
-        let own = if bare { layer.outline_mm } else { f64::from(height) };
+        let own = if bare { self.outline_mm(k, layer) } else { f64::from(height) };
         let l = layer.spec.offset_mm + own;
-        let op = joined(layer.spec.combine, c, l, layer.spec.height_mm, blend_mm, fade);
-        let z = (c + weight * (op - c)) as f32;
+        let op = |c: f64| joined(layer.spec.combine, c, l, layer.spec.height_mm, blend_mm, fade);
+        let c = f64::from(self.z[k]);
+        let (covered, fresh) = match layer.spec.combine {
+            Combine::Base => self.set_ground(k),
+            _ => self.cover_more(k),
+        };
+        let z = if layer.feathered || layer.spec.combine == Combine::Base || covered <= 0.0 {
+            c + weight * (op(c) - c)
+        } else {
+            let q = c / covered;
+            c + (weight - fresh) * (op(q) - q) + fresh * op(0.0)
+        };
+        let z = z as f32;
         if z != self.z[k] {
             self.z[k] = z;
             let mark = (index + 1).min(usize::from(COVERED - 1)) as u16;

@@ -526,3 +526,57 @@ proptest! {
         }
     }
 }
+
+fn crest(name: &str, base_mm: f64, height_mm: f64) -> LayerSpec {
+    let surface = SurfaceSpec::Ruled(crate::job::CrestSpec::default());
+    LayerSpec { surface, base_mm, height_mm, slope_cap: 4.0, ..flat(name, base_mm, Combine::Max) }
+}
+
+/// Two layers that share a wavy line stand wall to wall: no node along it falls below their base.
+#[test]
+fn layers_that_abut_leave_no_gap() {
+    let wave: Ring = (0..=400)
+        .map(|k| f64::from(k) / 400.0)
+        .map(|t| DVec2::new(2.0 + 16.0 * t, 8.0 + 1.5 * libm::sin(3.0 * TAU * t)))
+        .collect();
+    let mut low = vec![DVec2::new(2.0, 2.0), DVec2::new(18.0, 2.0)];
+    low.extend(wave.iter().rev());
+    let mut high = wave.clone();
+    high.extend([DVec2::new(18.0, 14.0), DVec2::new(2.0, 14.0)]);
+    let job = job(vec![crest("low", 2.0, 4.0), crest("high", 2.0, 4.0)]);
+    let relief = relief(&job, &outlines(vec![vec![low], vec![high]])).unwrap();
+    let grid = *relief.target.grid();
+    let mut seen = 0;
+    for j in 0..grid.ny {
+        for i in 0..grid.nx {
+            let p = grid.node(i, j);
+            let off = wave.iter().map(|w| w.distance(p)).fold(f64::INFINITY, f64::min);
+            if off < 1.5 * PITCH && (2.5..17.5).contains(&p.x) {
+                seen += 1;
+                let z = f64::from(relief.target.at(i, j)) + 8.0;
+                assert!(z >= 2.0 - 1e-5, "{z} at {p}");
+            }
+        }
+    }
+    assert!(seen > 100);
+}
+
+/// The cells that a hole's edge cuts have the height of the hole.
+#[test]
+fn a_hole_with_a_height_of_its_own_has_it_all_round() {
+    let mut layer = crest("ring", 1.0, 3.0);
+    layer.surface = SurfaceSpec::Ruled(crate::job::CrestSpec {
+        hole_base_mm: Some(2.0),
+        ..crate::job::CrestSpec::default()
+    });
+    let job = job(vec![layer]);
+    let mut all = outlines(vec![vec![rectangle(2.1, 2.1, 14.0, 12.0)]]);
+    let mut hole = rectangle(7.2, 6.2, 4.0, 4.0);
+    hole.reverse();
+    all.layers[0].figures[0].regions[0].holes.push(hole);
+    let relief = relief(&job, &all).unwrap();
+    // A node in the hole, 0.05 mm from its edge: 0.075 of the 0.25 mm of its cell are covered.
+    near(height(&relief, 7.25, 8.0), 0.3 * 2.0);
+    // One outside, 0.1 mm from the outline: 0.025 mm are covered.
+    near(height(&relief, 2.0, 8.0), 0.1 * 1.0);
+}

@@ -8,7 +8,7 @@ use super::{
     Cells, Class, Curve, NO_TRIANGLE, Sampled, SkeletonError, Triangulation, cells, triangulate,
     turn,
 };
-use crate::geom::{DVec2, distance_to_segment, orient, perimeter, signed_area};
+use crate::geom::{DVec2, Ring, distance_to_segment, orient, perimeter, signed_area};
 use crate::job::SkeletonSpec;
 use crate::outline::{Region, meeting_edges};
 
@@ -246,12 +246,11 @@ fn split(
 fn make_simple(rings: &mut [Marks]) -> Result<(), SkeletonError> {
     let farthest = |_, marks: &Marks, from, to| marks.farthest(from, to).map(|(s, _)| s);
     for _ in 0..SIMPLE_ROUNDS {
-        let points: Vec<Vec<DVec2>> = rings.iter().map(Marks::points).collect();
+        let points: Vec<Ring> = rings.iter().map(Marks::points).collect();
         let meeting = meeting_edges(points.iter().map(Vec::as_slice));
         if !meeting.is_empty() {
             if !split(rings, &meeting, farthest) {
-                let at = points.iter().flatten().nth(meeting[0]).copied();
-                return Err(SkeletonError::Crossing { at: at.unwrap_or(DVec2::ZERO) });
+                return Err(SkeletonError::Crossing { at: meeting_point(&points, &meeting) });
             }
             continue;
         }
@@ -268,6 +267,26 @@ fn make_simple(rings: &mut [Marks]) -> Result<(), SkeletonError> {
     }
     let at = rings.first().map_or(DVec2::ZERO, |marks| marks.curve.points()[0]);
     Err(SkeletonError::Crossing { at })
+}
+
+/// Where the first of some edges that meet others, numbered through all rings, meets one of them: the
+/// crossing, or its start where it only touches.
+fn meeting_point(rings: &[Ring], edges: &[usize]) -> DVec2 {
+    let all: Vec<[DVec2; 2]> = rings
+        .iter()
+        .flat_map(|ring| ring.iter().zip(ring.iter().cycle().skip(1)).map(|(&a, &b)| [a, b]))
+        .collect();
+    let [a, b] = all[edges[0]];
+    let crossing = edges[1..].iter().find_map(|&k| {
+        let [c, d] = all[k];
+        let (from, to) = (orient(c, d, a), orient(c, d, b));
+        let beside = orient(a, b, c) * orient(a, b, d) > 0.0;
+        (from * to <= 0.0 && from != to && !beside && ![c, d].contains(&a) && ![c, d].contains(&b))
+            .then(|| a + (b - a) * (from / (from - to)))
+    });
+    // Only ends touch: of edges that do not follow each other.
+    let touched = |p: &DVec2| edges[1..].iter().any(|&k| k > edges[0] + 1 && all[k].contains(p));
+    crossing.or_else(|| [b, a].into_iter().find(touched)).unwrap_or(a)
 }
 
 fn assemble(rings: &[Marks]) -> Sampled {

@@ -2,9 +2,12 @@
 
 use super::crested::{Fineness, Skeleton};
 use super::ridge::Ridge;
-use super::{Mesh, ruled};
-use crate::geom::{DVec2, Ring, orient};
-use crate::job::{Profile, Prune, SkeletonSpec};
+use super::{Mesh, Surface, raise_all, ruled};
+use crate::geom::{DVec2, Grid, Ring, Tolerance, orient};
+use crate::job::{
+    Combine, CrestSpec, LayerSpec, Profile, Prune, Selector, SkeletonSpec, SurfaceSpec,
+};
+use crate::outline::{Figure, OutlineLayer, Outlines};
 use crate::skeleton::fixture::{bar, hexring2, plus2, sampled};
 use crate::skeleton::{Sampled, cells, spine, triangulate};
 use crate::surface::{Rungs, rungs};
@@ -216,5 +219,79 @@ fn random_outlines_get_sound_meshes_at_three_densities() {
         }
 
         assert!(failed.len() as u32 * 100 <= count, "{part}: {failed:?}");
+    }
+}
+
+/// A layer over one figure at a pitch of 0.15 mm: its surfaces and notes.
+fn raise_figure(ring: Ring, surface: SurfaceSpec) -> (Vec<Vec<Surface>>, Vec<String>) {
+    let figure = Figure {
+        source: "path 'p'".into(),
+        regions: vec![crate::outline::Region { outer: ring, holes: vec![] }],
+    };
+    let layer = OutlineLayer { name: "layer".into(), figures: vec![figure] };
+    let outlines = Outlines { layers: vec![layer], notes: vec![] };
+    let spec = LayerSpec {
+        name: "layer".into(),
+        select: Selector::All,
+        surface,
+        base_mm: 0.0,
+        height_mm: 5.0,
+        offset_mm: 0.0,
+        combine: Combine::Max,
+        blend_mm: 0.0,
+        feather_mm: 0.0,
+        draft_rad: 0.0,
+        slope_cap: 4.0,
+        union: false,
+        visible: false,
+    };
+    let grid = Grid::covering(DVec2::ZERO, 12.0, 12.0, 0.15).unwrap();
+    let raised = raise_all(&outlines, &[spec], &grid, &Tolerance::default()).unwrap();
+    (raised.surfaces, raised.notes)
+}
+
+fn ring_of(points: &[[f64; 2]]) -> Ring {
+    points.iter().map(|&p| DVec2::from(p)).collect()
+}
+
+#[test]
+fn a_sound_figure_gets_the_mesh_without_a_note() {
+    let square = ring_of(&[[2.0, 2.0], [10.0, 2.0], [10.0, 10.0], [2.0, 10.0]]);
+    let (surfaces, notes) = raise_figure(square, SurfaceSpec::Ruled(CrestSpec::default()));
+    assert!(matches!(surfaces[0][0], Surface::Mesh(_)));
+    assert_eq!(notes, Vec::<String>::new());
+}
+
+/// A sliver from a real drawing: the mesh misses some of its area, the ratio field takes over, and the note
+/// says which figure, where and why.
+#[test]
+fn a_figure_that_fails_its_checks_becomes_a_ratio_field_with_a_note() {
+    let sliver = ring_of(&[
+        [7.479694843292, 9.4192385673523],
+        [7.439270753778, 9.4451997015303],
+        [7.477338314056, 9.3986554145813],
+        [7.501540660858, 9.3911194801331],
+        [7.502858638763, 9.3962874412537],
+    ]);
+    let (surfaces, notes) = raise_figure(sliver, SurfaceSpec::Ruled(CrestSpec::default()));
+    assert!(matches!(surfaces[0][0], Surface::Field(_)));
+    let note = notes.iter().find(|n| n.contains("ratio field")).expect("it says so");
+    for word in ["layer 'layer'", "path 'p'", "at 7.5, 9.4", "the mesh covers"] {
+        assert!(note.contains(word), "'{word}' is not in {note}");
+    }
+}
+
+/// A bow tie has no skeleton: it gets the distance profile, and the note says where it crosses itself.
+#[test]
+fn a_figure_without_a_skeleton_gets_the_distance_profile_with_a_note() {
+    for surface in
+        [SurfaceSpec::Ruled(CrestSpec::default()), SurfaceSpec::Ratio(CrestSpec::default())]
+    {
+        let bow = ring_of(&[[2.0, 2.0], [10.0, 8.0], [10.0, 2.0], [2.0, 8.0], [1.0, 5.0]]);
+        let (surfaces, notes) = raise_figure(bow, surface);
+        let Surface::Field(patch) = &surfaces[0][0] else { panic!("a distance profile") };
+        assert!(patch.z.iter().any(|z| *z > 1.0));
+        let note = notes.iter().find(|n| n.contains("no skeleton")).expect("it says so");
+        assert!(note.contains("crosses itself at [6.00, 5.00]"), "{note}");
     }
 }

@@ -327,3 +327,28 @@ fn artwork_that_holds_nothing_is_refused() {
     let error = Draft::for_artwork("a.svg", &Library::built_in()).settle(&huge).unwrap_err();
     assert!(error.to_string().contains("10000 mm"), "{error}");
 }
+
+/// Keys of the crest surfaces: what does not belong together is refused at its place.
+#[test]
+fn settings_of_surfaces_that_do_not_belong_together_are_refused() {
+    let layer =
+        |surface: &str| with(&format!("[[layer]]\nselect = \"all\"\nsurface = {surface}\n"));
+    for (surface, value, words) in [
+        ("{ method = \"ruled\", radius_mm = 3 }", "3 }", ["radius_mm", "\"profile\""]),
+        ("{ method = \"profile\", delta = 0.2 }", "0.2", ["delta", "\"ruled\" and \"ratio\""]),
+        (
+            "{ method = \"ratio\", prune = \"half-disc\", delta = 0.2 }",
+            "0.2",
+            ["delta", "inscribed"],
+        ),
+        (
+            "{ method = \"ruled\", along = [[0, 1], [0.5, 2]] }",
+            "[[0",
+            ["along", "0 at one end to 1"],
+        ),
+    ] {
+        let kind = |e: &JobError| matches!(e, JobError::Impossible(_));
+        let column = "surface = ".len() + surface.find(value).unwrap() + 1;
+        refused(&layer(surface), kind, (5, column), &words);
+    }
+}
