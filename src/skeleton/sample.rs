@@ -39,7 +39,7 @@ pub struct SampleLimits {
     pub least_edge_mm: f64,
 }
 
-/// Resamples the rings of a region, triangulates them and takes the triangles apart (see [`cells`]).
+/// Resamples the rings of a region, triangulates them and takes the triangles apart (see [`cells()`]).
 ///
 /// Rings are split at their corners, and each piece into even steps of about `spec.edge_mm` along the
 /// curve (area over perimeter when not given), at least 24 a ring. Edges are then split where they stray
