@@ -11,6 +11,7 @@
 mod chain;
 mod check;
 mod emit;
+mod finish;
 mod fit;
 mod ramp;
 mod raster;
@@ -210,6 +211,9 @@ pub fn plan(
             OperationKind::Raster { stepover, angle_rad } => {
                 raster::raster(&site, stepover, angle_rad, &mut block, &mut out)?;
             }
+            OperationKind::Finish { scallop_mm, angle_rad } => {
+                finish::finish(&site, scallop_mm, angle_rad, &mut block, &mut out)?;
+            }
         }
         for note in notes(&site, &out) {
             observe(PlanEvent::Note(note));
@@ -246,7 +250,7 @@ fn check_target(job: &Job, target: &Heightfield) -> Result<(), ToolpathError> {
 fn kind_name(operation: &Operation) -> &'static str {
     match operation.kind {
         OperationKind::Rough { .. } => "rough",
-        OperationKind::Raster { .. } => "finish",
+        OperationKind::Raster { .. } | OperationKind::Finish { .. } => "finish",
     }
 }
 

@@ -145,7 +145,7 @@ pub(super) const SPLITS: &[&str] = &["sleeves", "teddy"];
 /// Names of [`super::Join`], in its order.
 pub(super) const JOINS: &[&str] = &["clusters", "pairs"];
 /// Kinds of operation that there are.
-pub(super) const OPERATIONS: &[&str] = &["rough", "raster"];
+pub(super) const OPERATIONS: &[&str] = &["rough", "finish", "raster"];
 
 const LENGTH: f64 = 10_000.0;
 
@@ -555,16 +555,16 @@ pub(super) static OPERATION: Section = Section {
     keys: &[
         key(
             "kind",
-            Kind::Forms("\"rough\" or \"raster\""),
+            Kind::Forms("\"rough\", \"finish\" or \"raster\""),
             Required,
-            "rough: remove the bulk in levels; raster: parallel finishing passes",
+            "rough: remove the bulk in levels; finish: passes that hold the scallop on every slope; raster: parallel passes",
         ),
         key(
             "cutter",
             Kind::Forms(
                 "a name (`relievo cutters` lists them) or a table { shape = \"ball\", diameter_mm = 3, ... }",
             ),
-            Rule("rough: flat-6, raster: ball-3"),
+            Rule("rough: flat-6, finish and raster: ball-3"),
             "a name from `relievo cutters`, or a table as in machines/cutters.toml",
         ),
         key("leave_mm", mm(0.0, 20.0), Number(0.5), "rough: wood left on the relief"),
@@ -584,7 +584,7 @@ pub(super) static OPERATION: Section = Section {
             "scallop_mm",
             mm(0.0005, 1.0),
             Rule("tolerance.scallop_mm"),
-            "raster, ball cutters: height of the cusps, instead of stepover_mm",
+            "finish and raster, ball cutters: height of the cusps; in raster instead of stepover_mm",
         ),
         key(
             "angle_deg",

@@ -30,17 +30,18 @@ pub(super) struct OperationDraft {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum KindDraft {
     Rough,
+    Finish,
     Raster,
 }
 
-/// The operations of a job that names none: rough, then raster.
+/// The operations of a job that names none: rough, then finish.
 pub(super) fn default_operations(
     source: &Source,
     library: &Library,
 ) -> Result<Vec<OperationDraft>, JobError> {
     let nothing = DeTable::new();
     let table = Table::unchecked(source, &OPERATION, &nothing);
-    [KindDraft::Rough, KindDraft::Raster]
+    [KindDraft::Rough, KindDraft::Finish]
         .into_iter()
         .map(|kind| operation(&table, kind, library))
         .collect()
@@ -54,11 +55,13 @@ pub(super) fn read_operation(
     let word = text_or_form(table, "kind")?;
     let kind = match OPERATIONS.iter().position(|name| *name == word) {
         Some(0) => KindDraft::Rough,
+        Some(1) => KindDraft::Finish,
         Some(_) => KindDraft::Raster,
         None => return Err(table.unknown_word("kind", "kind of operation", word, OPERATIONS)),
     };
     let foreign: &[&str] = match kind {
         KindDraft::Rough => &["scallop_mm"],
+        KindDraft::Finish => &["leave_mm", "stepdown_mm", "stepover_mm"],
         KindDraft::Raster => &["leave_mm", "stepdown_mm"],
     };
     if let Some(name) = foreign.iter().find(|name| table.raw(name).is_some()) {
@@ -75,6 +78,11 @@ pub(super) fn read_operation(
     if draft.stepover_mm.is_some() && draft.scallop_mm.is_some() {
         let message = "the distance of the passes is given twice: by stepover_mm and by scallop_mm";
         return Err(table.impossible("stepover_mm", message, "", "keep one of the two"));
+    }
+    if kind == KindDraft::Finish && draft.cutter.shape == CutterShape::Flat {
+        let message = format!("a flat cutter ({}) cannot finish slopes", draft.cutter.name);
+        let help = "take a ball cutter, or kind = \"raster\" with stepover_mm";
+        return Err(table.impossible("cutter", &message, "", help));
     }
     if draft.scallop_mm.is_some() && draft.cutter.shape == CutterShape::Flat {
         let message = format!("a flat cutter ({}) leaves no cusps", draft.cutter.name);
@@ -95,7 +103,7 @@ fn operation(
 ) -> Result<OperationDraft, JobError> {
     let default_cutter = match kind {
         KindDraft::Rough => rule::CUTTERS.0,
-        KindDraft::Raster => rule::CUTTERS.1,
+        KindDraft::Finish | KindDraft::Raster => rule::CUTTERS.1,
     };
     Ok(OperationDraft {
         kind,
@@ -137,7 +145,7 @@ impl Draft {
         pitch_mm: f64,
         notes: &mut Vec<String>,
     ) -> Result<Vec<Operation>, JobError> {
-        if self.operations.first().is_some_and(|op| op.kind == KindDraft::Raster) {
+        if self.operations.first().is_some_and(|op| op.kind != KindDraft::Rough) {
             notes.push(
                 "no roughing comes before the finishing passes: their cutter clears the wood in levels first, which takes long"
                     .to_owned(),
@@ -265,6 +273,9 @@ impl Step<'_> {
                 stepover_mm: draft.stepover_mm.unwrap_or(round(rule::ROUGH_STEPOVER * diameter)),
                 angle_rad,
             },
+            KindDraft::Finish => {
+                OperationKind::Finish { scallop_mm: self.scallop_mm()?, angle_rad }
+            }
             KindDraft::Raster => OperationKind::Raster { stepover: self.stepover()?, angle_rad },
         })
     }
@@ -293,12 +304,17 @@ impl Step<'_> {
         if cutter.shape == CutterShape::Flat {
             return Ok(Stepover::Plan(round(rule::FLAT_STEPOVER * cutter.diameter_mm)));
         }
+        Ok(Stepover::Scallop(self.scallop_mm()?))
+    }
+
+    fn scallop_mm(&self) -> Result<f64, JobError> {
+        let cutter = &self.draft.cutter;
         let scallop_mm = self.draft.scallop_mm.unwrap_or(self.job.tolerance.scallop_mm);
         if scallop_mm >= cutter.diameter_mm / 2.0 {
             let message =
                 format!("cusps of {scallop_mm} mm are higher than the radius of {}", cutter.name);
             return self.refuse(&["scallop_mm", "cutter"], &message, "0.01 is usual");
         }
-        Ok(Stepover::Scallop(scallop_mm))
+        Ok(scallop_mm)
     }
 }

@@ -500,6 +500,14 @@ pub enum OperationKind {
         /// Direction of the passes from the x axis, radians.
         angle_rad: f64,
     },
+    /// Passes that leave no more than a scallop height on any slope: parallel ones over everything, then passes
+    /// across wherever those left more.
+    Finish {
+        /// Height of the cusps, mm.
+        scallop_mm: f64,
+        /// Direction of the first passes from the x axis, radians.
+        angle_rad: f64,
+    },
     /// Parallel passes over the whole target.
     Raster {
         /// Distance of the passes.

@@ -359,6 +359,9 @@ fn operation_lines(operation: &Operation) -> Vec<Line> {
             ];
             ("rough", lines, angle_rad)
         }
+        OperationKind::Finish { scallop_mm, angle_rad } => {
+            ("finish", vec![("scallop_mm", number(scallop_mm))], angle_rad)
+        }
         OperationKind::Raster { stepover, angle_rad } => {
             let line = match stepover {
                 Stepover::Plan(stepover) => ("stepover_mm", number(stepover)),

@@ -34,7 +34,7 @@ const LEVELS_STEPOVER_PER_DIAMETER: f64 = 0.25;
 const LEVELS_SHORTEST_PER_DIAMETER: f64 = 0.1;
 
 /// How far beyond its work a pass begins and ends when the row has room: space to ramp, mm.
-const ENTRY_ROOM_MM: f64 = 2.0;
+pub(super) const ENTRY_ROOM_MM: f64 = 2.0;
 
 /// Distance of passes that leaves cusps of `scallop_mm` on level ground, mm: s = 2 sqrt(2 R h - h^2).
 /// `None` for a cutter without a round end, whose cusps have no such height.
@@ -67,18 +67,58 @@ pub(super) fn raster(
         }
     };
     clear_deep_wood(site, angle_rad, block, out)?;
+    let cut = Passes { stepover_mm, angle_rad, only: None, room_mm: ENTRY_ROOM_MM };
+    let moves = passes(site, &cut, block, out)?;
+    out.note_deep_pass(moves.deepest_mm);
+    if site.later {
+        block.cut(&profile, &out.moves()[moves.first..]);
+    }
+    Ok(())
+}
+
+/// One set of parallel passes.
+pub(super) struct Passes<'a> {
+    /// Their distance, mm.
+    pub(super) stepover_mm: f64,
+    /// Their direction from the x axis, radians.
+    pub(super) angle_rad: f64,
+    /// Where to work; `None` = everywhere.
+    pub(super) only: Option<&'a (dyn Fn(DVec2) -> bool + Sync)>,
+    /// How far beyond its work a pass begins and ends where the row has room, mm.
+    pub(super) room_mm: f64,
+}
+
+/// What passes added.
+pub(super) struct Passed {
+    /// Index of the first of their moves.
+    pub(super) first: usize,
+    /// The deepest wood they cut at once, where that is deeper than one pass should, mm; else 0.
+    pub(super) deepest_mm: f64,
+}
+
+/// Plans one set of passes on the wood as it is; the moves go to `out`, the wood is left to the caller.
+pub(super) fn passes(
+    site: &Site,
+    cut: &Passes,
+    block: &Block,
+    out: &mut Emitter,
+) -> Result<Passed, ToolpathError> {
+    let profile = Profile::of(&site.operation.cutter);
     let dropper = Dropper::new(site.target, profile);
+    let wood = Dropper::new(block.field(), profile);
     let fit_mm = site.job.tolerance.fit_mm;
     let pitch = site.target.grid().pitch_mm;
     let tracer = Tracer::new(|p: DVec2| dropper.drop(p), profile, pitch, fit_mm);
-    site.refuse_endless(angle_rad, stepover_mm, tracer.spacing_mm())?;
+    site.refuse_endless(cut.angle_rad, cut.stepover_mm, tracer.spacing_mm())?;
 
     let bounds = site.job.stock.bounds();
-    let mut rows = rows(&bounds, angle_rad, stepover_mm);
-    rows.extend(slanted_rim(&bounds, angle_rad));
+    let mut rows = rows(&bounds, cut.angle_rad, cut.stepover_mm);
+    if cut.only.is_none() {
+        rows.extend(slanted_rim(&bounds, cut.angle_rad));
+    }
     let spans: Vec<Vec<Span>> =
-        rows.into_par_iter().map(|row| spans(site, &row, tracer.trace(row.from, row.to))).collect();
-    out.note_deep_pass(deepest_pass_mm(&spans, block, site.operation.cutter.diameter_mm));
+        rows.into_par_iter().map(|row| row_spans(site, cut, &row, &tracer)).collect();
+    let deepest_mm = deepest_pass_mm(&spans, block, site.operation.cutter.diameter_mm);
     let link = |a: DVec3, b: DVec3| {
         let lift = lift_seconds(site.job, site.operation, a, b);
         if feed_seconds(site.operation, &[a, b]) > lift {
@@ -93,20 +133,49 @@ pub(super) fn raster(
         (feed_seconds(site.operation, &points) <= lift)
             .then(|| points[1..points.len() - 1].to_vec())
     };
-    let before = out.moves().len();
+    let first = out.moves().len();
     for chain in chains(spans, link) {
-        let wood = block.highest_under(profile.radius_mm(), chain[0].truncate());
-        out.chain(&chain, wood);
+        // Where the cutter would touch the wood: a high wall beside it does not count.
+        let touch_mm = wood.drop(chain[0].truncate());
+        out.chain(&chain, touch_mm);
     }
-    if site.later {
-        block.cut(&profile, &out.moves()[before..]);
+    Ok(Passed { first, deepest_mm })
+}
+
+/// The spans of a row with something to cut. Where only some places are asked for, nothing else is computed.
+fn row_spans(
+    site: &Site,
+    cut: &Passes,
+    row: &Row,
+    tracer: &Tracer<impl Fn(DVec2) -> f64>,
+) -> Vec<Span> {
+    let Some(only) = cut.only else {
+        return spans(site, row, cut.room_mm, tracer.trace(row.from, row.to));
+    };
+    let length = row.from.distance(row.to);
+    let n = (length / site.target.grid().pitch_mm).ceil().max(1.0) as usize;
+    let place = |k: usize| length * (k as f64 / n as f64);
+    let at = |s: f64| row.from + (row.to - row.from) * (s / length);
+    let mut stretches: Vec<(f64, f64)> = Vec::new();
+    for s in (0..=n).map(place).filter(|&s| only(at(s))) {
+        let (low, high) = ((s - cut.room_mm).max(0.0), (s + cut.room_mm).min(length));
+        match stretches.last_mut() {
+            Some((_, to)) if low <= *to => *to = high,
+            _ => stretches.push((low, high)),
+        }
     }
-    Ok(())
+    let parts = stretches.into_iter().map(|(low, high)| Row { from: at(low), to: at(high) });
+    parts
+        .flat_map(|part| {
+            let path = tracer.trace(part.from, part.to);
+            spans(site, &part, cut.room_mm, path)
+        })
+        .collect()
 }
 
 /// Takes wood that is too deep for one pass down in levels: along the passes and, for what is left in slots
 /// that lie across them, at right angles.
-fn clear_deep_wood(
+pub(super) fn clear_deep_wood(
     site: &Site,
     angle_rad: f64,
     block: &mut Block,
@@ -146,7 +215,7 @@ fn over_the_top(path: &mut [Sample]) {
 
 /// The stretches of a row with something to cut, with room at both ends, fitted. Gaps that are quicker to cross at
 /// the stock's top than by lifting do not split.
-fn spans(site: &Site, row: &Row, mut path: Vec<Sample>) -> Vec<Span> {
+fn spans(site: &Site, row: &Row, room_mm: f64, mut path: Vec<Sample>) -> Vec<Span> {
     let mut stretches: Vec<(usize, usize)> = Vec::new();
     for (k, p) in path.iter().enumerate() {
         if p.z <= TOP_MM {
@@ -161,7 +230,7 @@ fn spans(site: &Site, row: &Row, mut path: Vec<Sample>) -> Vec<Span> {
     stretches
         .iter()
         .map(|&(from, to)| {
-            let (low, high) = (path[from].s - ENTRY_ROOM_MM, path[to].s + ENTRY_ROOM_MM);
+            let (low, high) = (path[from].s - room_mm, path[to].s + room_mm);
             let from = path[..from].partition_point(|p| p.s < low);
             let to = to + path[to..].partition_point(|p| p.s <= high) - 1;
             points(row, &fit(&path[from..=to], fit_mm))
