@@ -13,11 +13,13 @@ mod check;
 mod emit;
 mod finish;
 mod fit;
+mod left;
 mod ramp;
 mod raster;
 mod rough;
 mod rows;
 mod trace;
+mod waterline;
 
 #[cfg(test)]
 pub(crate) mod fixture;

@@ -7,12 +7,12 @@ pub(super) type Span = Vec<DVec3>;
 
 /// Joins spans of neighbouring rows into zigzag chains.
 ///
-/// `link(a, b)` gives the points between `a` and `b` of a way that keeps the tool down, or `None` when there
-/// is none or lifting is quicker. The order is fixed by the spans alone: lowest row first, then on to the
+/// `link(done, next)` gives the points between the end of the path `done` and the start of `next` of a way that keeps
+/// the tool down, or `None` when there is none or lifting is quicker. The order is fixed by the spans alone: lowest row first, then on to the
 /// next row as long as a link is found, nearest end first.
 pub(super) fn chains(
     rows: Vec<Vec<Span>>,
-    mut link: impl FnMut(DVec3, DVec3) -> Option<Vec<DVec3>>,
+    mut link: impl FnMut(&[DVec3], &[DVec3]) -> Option<Vec<DVec3>>,
 ) -> Vec<Vec<DVec3>> {
     let mut rows: Vec<Vec<Option<Span>>> =
         rows.into_iter().map(|row| row.into_iter().map(Some).collect()).collect();
@@ -40,7 +40,7 @@ pub(super) fn chains(
 fn extend(
     chain: &mut Vec<DVec3>,
     row: &mut [Option<Span>],
-    link: &mut impl FnMut(DVec3, DVec3) -> Option<Vec<DVec3>>,
+    link: &mut impl FnMut(&[DVec3], &[DVec3]) -> Option<Vec<DVec3>>,
 ) -> bool {
     /// Ends of a row's spans that are tried before the tool is lifted.
     const TRIES: usize = 2;
@@ -53,17 +53,19 @@ fn extend(
     }
     ends.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)).then(a.2.cmp(&b.2)));
     for &(_, k, from_its_end) in ends.iter().take(TRIES) {
-        let Some(span) = &row[k] else { continue };
-        let entry = if from_its_end { span[span.len() - 1] } else { span[0] };
-        if let Some(between) = link(at, entry) {
-            let Some(mut span) = row[k].take() else { continue };
-            if from_its_end {
-                span.reverse();
-            }
+        let Some(mut span) = row[k].take() else { continue };
+        if from_its_end {
+            span.reverse();
+        }
+        if let Some(between) = link(chain, &span) {
             chain.extend(between);
             chain.extend(span);
             return true;
         }
+        if from_its_end {
+            span.reverse();
+        }
+        row[k] = Some(span);
     }
     false
 }
@@ -91,7 +93,7 @@ mod tests {
         rows.extend(
             (1..4).map(|k| vec![span(0.0, 3.0, f64::from(k)), span(7.0, 10.0, f64::from(k))]),
         );
-        let chains = chains(rows, |a, b| (a.distance(b) < 2.0).then(Vec::new));
+        let chains = chains(rows, |a, b| (a[a.len() - 1].distance(b[0]) < 2.0).then(Vec::new));
         assert_eq!(chains.len(), 2);
         assert_eq!(chains.iter().map(Vec::len).sum::<usize>(), 14);
     }

@@ -21,7 +21,7 @@ use crate::stock::Block;
 use rayon::prelude::*;
 
 /// Where the tip would stay above this height there is nothing to cut, mm.
-const TOP_MM: f64 = -1e-3;
+pub(super) const TOP_MM: f64 = -1e-3;
 /// Gap at which the tip passes over the untouched top of the stock, mm.
 const TOP_GAP_MM: f64 = 0.1;
 /// Deepest cut of a finishing pass, in diameters; deeper wood is taken down in levels first.
@@ -34,7 +34,9 @@ const LEVELS_STEPOVER_PER_DIAMETER: f64 = 0.25;
 const LEVELS_SHORTEST_PER_DIAMETER: f64 = 0.1;
 
 /// How far beyond its work a pass begins and ends when the row has room: space to ramp, mm.
-pub(super) const ENTRY_ROOM_MM: f64 = 2.0;
+const ENTRY_ROOM_MM: f64 = 2.0;
+/// A link that takes more than this many times the time of the straight way has met a wall.
+const STRAIGHT_ENOUGH: f64 = 2.0;
 
 /// Distance of passes that leaves cusps of `scallop_mm` on level ground, mm: s = 2 sqrt(2 R h - h^2).
 /// `None` for a cutter without a round end, whose cusps have no such height.
@@ -67,7 +69,7 @@ pub(super) fn raster(
         }
     };
     clear_deep_wood(site, angle_rad, block, out)?;
-    let cut = Passes { stepover_mm, angle_rad, only: None, room_mm: ENTRY_ROOM_MM };
+    let cut = Passes { stepover_mm, angle_rad, only: None };
     let moves = passes(site, &cut, block, out)?;
     out.note_deep_pass(moves.deepest_mm);
     if site.later {
@@ -82,10 +84,8 @@ pub(super) struct Passes<'a> {
     pub(super) stepover_mm: f64,
     /// Their direction from the x axis, radians.
     pub(super) angle_rad: f64,
-    /// Where to work; `None` = everywhere.
-    pub(super) only: Option<&'a (dyn Fn(DVec2) -> bool + Sync)>,
-    /// How far beyond its work a pass begins and ends where the row has room, mm.
-    pub(super) room_mm: f64,
+    /// Where to work, by the height up to which the tip may go there (-inf: not at all); `None` = everywhere.
+    pub(super) only: Option<&'a (dyn Fn(DVec2) -> f64 + Sync)>,
 }
 
 /// What passes added.
@@ -119,20 +119,7 @@ pub(super) fn passes(
     let spans: Vec<Vec<Span>> =
         rows.into_par_iter().map(|row| row_spans(site, cut, &row, &tracer)).collect();
     let deepest_mm = deepest_pass_mm(&spans, block, site.operation.cutter.diameter_mm);
-    let link = |a: DVec3, b: DVec3| {
-        let lift = lift_seconds(site.job, site.operation, a, b);
-        if feed_seconds(site.operation, &[a, b]) > lift {
-            return None;
-        }
-        let way = Row { from: a.truncate(), to: b.truncate() };
-        let mut path = tracer.trace(way.from, way.to);
-        over_the_top(&mut path);
-        let last = path.len() - 1;
-        (path[0].z, path[last].z) = (a.z, b.z);
-        let points = points(&way, &fit(&path, fit_mm));
-        (feed_seconds(site.operation, &points) <= lift)
-            .then(|| points[1..points.len() - 1].to_vec())
-    };
+    let link = |done: &[DVec3], next: &[DVec3]| link(site, &tracer, done, next);
     let first = out.moves().len();
     for chain in chains(spans, link) {
         // Where the cutter would touch the wood: a high wall beside it does not count.
@@ -140,6 +127,42 @@ pub(super) fn passes(
         out.chain(&chain, touch_mm);
     }
     Ok(Passed { first, deepest_mm })
+}
+
+/// A way over the target from the end of the path `done` to the start of `next` with the tool down, ends left out;
+/// `None` where lifting is quicker.
+pub(super) fn link(
+    site: &Site,
+    tracer: &Tracer<impl Fn(DVec2) -> f64>,
+    done: &[DVec3],
+    next: &[DVec3],
+) -> Option<Vec<DVec3>> {
+    let (a, b) = (done[done.len() - 1], next[0]);
+    let seconds = |way: &[DVec3]| feed_seconds(site.operation, way);
+    let (straight, lift) = (seconds(&[a, b]), lift_seconds(site.job, site.operation, a, b));
+    if straight > lift {
+        return None;
+    }
+    let over = |a: DVec3, b: DVec3| {
+        let way = Row { from: a.truncate(), to: b.truncate() };
+        let mut path = tracer.trace(way.from, way.to);
+        over_the_top(&mut path);
+        let last = path.len() - 1;
+        (path[0].z, path[last].z) = (a.z, b.z);
+        points(&way, &fit(&path, site.job.tolerance.fit_mm))
+    };
+    let mut way = over(a, b);
+    if seconds(&way) > STRAIGHT_ENOUGH * straight {
+        // A wall in the way, as between the ends of two passes that touch it: step back first.
+        let (back, on) = (stretch_back(done, a.distance(b)), stretch(next, a.distance(b)));
+        let (from, to) = (back[back.len() - 1], on[on.len() - 1]);
+        let detour: Vec<DVec3> =
+            back.into_iter().chain(over(from, to)).chain(on.into_iter().rev()).collect();
+        if seconds(&detour) < seconds(&way) {
+            way = detour;
+        }
+    }
+    (seconds(&way) <= lift).then(|| way[1..way.len() - 1].to_vec())
 }
 
 /// The spans of a row with something to cut. Where only some places are asked for, nothing else is computed.
@@ -150,27 +173,64 @@ fn row_spans(
     tracer: &Tracer<impl Fn(DVec2) -> f64>,
 ) -> Vec<Span> {
     let Some(only) = cut.only else {
-        return spans(site, row, cut.room_mm, tracer.trace(row.from, row.to));
+        return spans(site, row, tracer.trace(row.from, row.to));
     };
     let length = row.from.distance(row.to);
-    let n = (length / site.target.grid().pitch_mm).ceil().max(1.0) as usize;
-    let place = |k: usize| length * (k as f64 / n as f64);
+    let pitch = site.target.grid().pitch_mm;
+    let n = (length / pitch).ceil().max(1.0) as usize;
     let at = |s: f64| row.from + (row.to - row.from) * (s / length);
     let mut stretches: Vec<(f64, f64)> = Vec::new();
-    for s in (0..=n).map(place).filter(|&s| only(at(s))) {
-        let (low, high) = ((s - cut.room_mm).max(0.0), (s + cut.room_mm).min(length));
+    for s in (0..=n).map(|k| length * (k as f64 / n as f64)) {
+        if only(at(s)) == f64::NEG_INFINITY {
+            continue;
+        }
         match stretches.last_mut() {
-            Some((_, to)) if low <= *to => *to = high,
-            _ => stretches.push((low, high)),
+            Some((_, to)) if s - *to <= 1.5 * pitch => *to = s,
+            _ => stretches.push((s, s)),
         }
     }
-    let parts = stretches.into_iter().map(|(low, high)| Row { from: at(low), to: at(high) });
-    parts
-        .flat_map(|part| {
-            let path = tracer.trace(part.from, part.to);
-            spans(site, &part, cut.room_mm, path)
-        })
-        .collect()
+    let mut spans = Vec::new();
+    for (from, to) in stretches.into_iter().filter(|(from, to)| from < to) {
+        let part = Row { from: at(from), to: at(to) };
+        let path = tracer.trace(part.from, part.to);
+        // Up to walls, not over them.
+        let wanted = |p: &Sample| p.z <= TOP_MM && p.z <= only(at(from + p.s));
+        for run in path.chunk_by(|a, b| wanted(a) == wanted(b)) {
+            if run.len() > 1 && wanted(&run[0]) {
+                spans.push(points(&part, &fit(run, site.job.tolerance.fit_mm)));
+            }
+        }
+    }
+    spans
+}
+
+/// The last `length` of a path, backwards.
+fn stretch_back(path: &[DVec3], length: f64) -> Vec<DVec3> {
+    stretch_of(path.iter().rev(), length)
+}
+
+/// The first `length` of a path.
+fn stretch(path: &[DVec3], length: f64) -> Vec<DVec3> {
+    stretch_of(path.iter(), length)
+}
+
+fn stretch_of<'a>(path: impl Iterator<Item = &'a DVec3>, length: f64) -> Vec<DVec3> {
+    let mut out: Vec<DVec3> = Vec::new();
+    let mut left = length;
+    for &p in path {
+        let Some(&last) = out.last() else {
+            out.push(p);
+            continue;
+        };
+        let step = last.distance(p);
+        if step >= left {
+            out.push(last + (p - last) * (left / step));
+            break;
+        }
+        left -= step;
+        out.push(p);
+    }
+    out
 }
 
 /// Takes wood that is too deep for one pass down in levels: along the passes and, for what is left in slots
@@ -215,7 +275,7 @@ fn over_the_top(path: &mut [Sample]) {
 
 /// The stretches of a row with something to cut, with room at both ends, fitted. Gaps that are quicker to cross at
 /// the stock's top than by lifting do not split.
-fn spans(site: &Site, row: &Row, room_mm: f64, mut path: Vec<Sample>) -> Vec<Span> {
+fn spans(site: &Site, row: &Row, mut path: Vec<Sample>) -> Vec<Span> {
     let mut stretches: Vec<(usize, usize)> = Vec::new();
     for (k, p) in path.iter().enumerate() {
         if p.z <= TOP_MM {
@@ -230,7 +290,7 @@ fn spans(site: &Site, row: &Row, room_mm: f64, mut path: Vec<Sample>) -> Vec<Spa
     stretches
         .iter()
         .map(|&(from, to)| {
-            let (low, high) = (path[from].s - room_mm, path[to].s + room_mm);
+            let (low, high) = (path[from].s - ENTRY_ROOM_MM, path[to].s + ENTRY_ROOM_MM);
             let from = path[..from].partition_point(|p| p.s < low);
             let to = to + path[to..].partition_point(|p| p.s <= high) - 1;
             points(row, &fit(&path[from..=to], fit_mm))

@@ -109,7 +109,8 @@ pub(super) fn rough(
         for s in &surveys {
             by_row[s.number].extend(spans(s, z, cut, site.operation.cutter.diameter_mm));
         }
-        let link = |a: DVec3, b: DVec3| {
+        let link = |done: &[DVec3], next: &[DVec3]| {
+            let (a, b) = (done[done.len() - 1], next[0]);
             let direct = [a, b];
             if feed_seconds(site.operation, &direct) > lift_seconds(site.job, site.operation, a, b)
             {

@@ -1,0 +1,202 @@
+//! Where wood is left above what the cutter can reach, and where its axis has to go to take it.
+
+use crate::geom::{DVec2, DVec3, Grid, Heightfield};
+use rayon::prelude::*;
+
+/// Work is asked for this far beyond what is left, mm: room to ramp.
+const ROOM_MM: f64 = 0.3;
+/// The tip may climb this many stepovers above the work: up to walls, not over them.
+const CLIMB: f64 = 2.0;
+
+/// What finishing is measured on, all over one grid.
+pub(super) struct Surfaces<'a> {
+    /// Lowest heights of the tip.
+    pub(super) tip: &'a Heightfield,
+    /// The lowest surface that the cutter can leave.
+    pub(super) reach: &'a Heightfield,
+    /// The wood as it is.
+    pub(super) wood: &'a Heightfield,
+}
+
+/// Where the cutter's axis has to pass to take away what is left.
+pub(super) struct Left {
+    grid: Grid,
+    /// By node: how high the tip may go there; -inf where it is not wanted.
+    cap_mm: Vec<f32>,
+}
+
+impl Surfaces<'_> {
+    /// The places for wood that stands more than `limit_mm` above what can be reached, normal to it; `None` when there
+    /// is none.
+    pub(super) fn left(&self, limit_mm: f64, radius_mm: f64, stepover_mm: f64) -> Option<Left> {
+        let grid = *self.reach.grid();
+        let found: Vec<Vec<usize>> = (0..grid.ny)
+            .into_par_iter()
+            .map(|j| {
+                let axis = |i| self.axis_for(i, j, limit_mm, radius_mm);
+                (0..grid.nx).filter_map(axis).collect()
+            })
+            .collect();
+        if found.iter().all(Vec::is_empty) {
+            return None;
+        }
+        let mut cap_mm = vec![f32::NEG_INFINITY; grid.len()];
+        for k in found.into_iter().flatten() {
+            cap_mm[k] = self.tip.z()[k] + (CLIMB * stepover_mm) as f32;
+        }
+        let by = ((stepover_mm + ROOM_MM) / grid.pitch_mm).ceil() as usize + 1;
+        Some(Left { grid, cap_mm: grown(&cap_mm, grid.nx, by) })
+    }
+
+    /// True when the surface that can be reached comes within `limit_mm` of a point above node (i, j).
+    fn is_within(&self, p: DVec3, i: usize, j: usize, limit_mm: f64) -> bool {
+        let grid = self.reach.grid();
+        let cells = (limit_mm / grid.pitch_mm).ceil() as usize + 1;
+        let span = |k: usize, n: usize| k.saturating_sub(cells)..(k + cells).min(n - 1);
+        let corner = |i: usize, j: usize| grid.node(i, j).extend(f64::from(self.reach.at(i, j)));
+        span(j, grid.ny).any(|j| {
+            span(i, grid.nx).any(|i| {
+                let [a, b, c, d] =
+                    [corner(i, j), corner(i + 1, j), corner(i + 1, j + 1), corner(i, j + 1)];
+                let (low, high) = (a.min(b).min(c.min(d)), a.max(b).max(c.max(d)));
+                let away = (low - p).max(p - high).max(DVec3::ZERO);
+                away.length_squared() <= limit_mm * limit_mm
+                    && [[a, b, c], [a, c, d]]
+                        .into_iter()
+                        .any(|facet| distance_to_facet(p, facet) <= limit_mm)
+            })
+        })
+    }
+
+    /// The node that the axis must pass by to take the wood at node (i, j) down to what can be reached; `None` when
+    /// there is no more than `limit_mm`.
+    fn axis_for(&self, i: usize, j: usize, limit_mm: f64, radius_mm: f64) -> Option<usize> {
+        let grid = self.reach.grid();
+        let (last_i, last_j) = (grid.nx - 1, grid.ny - 1);
+        let z = |i: usize, j: usize| f64::from(self.reach.at(i, j));
+        let here = z(i, j);
+        let gap = f64::from(self.wood.at(i, j)) - here;
+        if gap <= limit_mm {
+            return None;
+        }
+        let (west, east) = (z(i.saturating_sub(1), j), z((i + 1).min(last_i), j));
+        let (south, north) = (z(i, j.saturating_sub(1)), z(i, (j + 1).min(last_j)));
+        let above = grid.node(i, j).extend(here + gap);
+        if self.is_within(above, i, j, limit_mm) {
+            return None;
+        }
+        // The axis stands one radius along the normal from the place it touches.
+        let slope = DVec2::new(east - west, north - south) / (2.0 * grid.pitch_mm);
+        let normal = -slope / (1.0 + slope.length_squared()).sqrt();
+        let at = grid.to_grid(grid.node(i, j) + normal * radius_mm).round();
+        let at = at.clamp(DVec2::ZERO, DVec2::new(last_i as f64, last_j as f64));
+        // At a wall the rounding must not end on top of it.
+        let (ci, cj) = (at.x as usize, at.y as usize);
+        let near = (cj.saturating_sub(1)..=(cj + 1).min(last_j)).flat_map(|j| {
+            (ci.saturating_sub(1)..=(ci + 1).min(last_i)).map(move |i| j * grid.nx + i)
+        });
+        near.min_by(|&a, &b| self.tip.z()[a].total_cmp(&self.tip.z()[b]))
+    }
+}
+
+impl Left {
+    /// True where the tip may go at all.
+    pub(super) fn is_wanted(&self, node: usize) -> bool {
+        self.cap_mm[node] > f32::NEG_INFINITY
+    }
+
+    /// How high the tip may go at a point, mm.
+    pub(super) fn cap_mm(&self, p: DVec2) -> f64 {
+        let at = self.grid.to_grid(p).round().max(DVec2::ZERO);
+        let (i, j) = (at.x as usize, at.y as usize);
+        if i < self.grid.nx && j < self.grid.ny {
+            f64::from(self.cap_mm[j * self.grid.nx + i])
+        } else {
+            f64::NEG_INFINITY
+        }
+    }
+}
+
+/// The highest value within `by` columns and rows.
+fn grown(values: &[f32], nx: usize, by: usize) -> Vec<f32> {
+    let ny = values.len() / nx;
+    let raise = |out: &mut f32, v: f32| *out = out.max(v);
+    let mut wide = vec![f32::NEG_INFINITY; values.len()];
+    wide.par_chunks_mut(nx).zip(values.par_chunks(nx)).for_each(|(wide, row)| {
+        for i in (0..nx).filter(|&i| row[i] > f32::NEG_INFINITY) {
+            wide[i.saturating_sub(by)..(i + by + 1).min(nx)]
+                .iter_mut()
+                .for_each(|w| raise(w, row[i]));
+        }
+    });
+    let mut high = vec![f32::NEG_INFINITY; values.len()];
+    high.par_chunks_mut(nx).enumerate().for_each(|(j, high)| {
+        for row in j.saturating_sub(by)..(j + by + 1).min(ny) {
+            let row = &wide[row * nx..(row + 1) * nx];
+            high.iter_mut().zip(row).for_each(|(high, &wide)| raise(high, wide));
+        }
+    });
+    high
+}
+
+/// Distance of a point from a triangle, mm.
+fn distance_to_facet(p: DVec3, [a, b, c]: [DVec3; 3]) -> f64 {
+    let normal = (b - a).cross(c - a);
+    let beside = |from: DVec3, to: DVec3| (to - from).cross(p - from).dot(normal) < 0.0;
+    let edges = [[a, b], [b, c], [c, a]];
+    if edges.iter().any(|&[from, to]| beside(from, to)) {
+        let to_edge = |[from, to]: [DVec3; 2]| {
+            let along = to - from;
+            let t = ((p - from).dot(along) / along.length_squared()).clamp(0.0, 1.0);
+            p.distance(from + along * t)
+        };
+        edges.into_iter().map(to_edge).fold(f64::INFINITY, f64::min)
+    } else {
+        ((p - a).dot(normal) / normal.length()).abs()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        /// No point of a dense sample of the triangle is nearer, and one is nearly as near.
+        #[test]
+        fn the_distance_to_a_facet_is_that_to_its_nearest_point(
+            v in prop::collection::vec(-2.0f64..2.0, 12),
+        ) {
+            let at = |k: usize| DVec3::new(v[3 * k], v[3 * k + 1], v[3 * k + 2]);
+            let (p, facet) = (at(3), [at(0), at(1), at(2)]);
+            prop_assume!((facet[1] - facet[0]).cross(facet[2] - facet[0]).length() > 1e-3);
+            let n = 200;
+            let mut nearest = f64::INFINITY;
+            for i in 0..=n {
+                for j in 0..=n - i {
+                    let (s, t) = (f64::from(i) / f64::from(n), f64::from(j) / f64::from(n));
+                    let q = facet[0] + (facet[1] - facet[0]) * s + (facet[2] - facet[0]) * t;
+                    nearest = nearest.min(q.distance(p));
+                }
+            }
+            let got = distance_to_facet(p, facet);
+            prop_assert!(got <= nearest + 1e-9 && got >= nearest - 0.06, "{got} {nearest}");
+        }
+    }
+
+    /// A wall with a film of wood before it: the axis is sent one radius off the wall, at its foot.
+    #[test]
+    fn wood_on_a_wall_sends_the_axis_before_it() {
+        let grid = Grid::covering(DVec2::ZERO, 10.0, 4.0, 0.1).unwrap();
+        let wall = |x: f64| if x >= 5.0 { -1.0 } else { -4.0 };
+        let reach = Heightfield::from_fn(grid, |p| wall(p.x));
+        let wood = Heightfield::from_fn(grid, |p| wall(p.x + 0.15));
+        let tip = Heightfield::from_fn(grid, |p| wall(p.x + 1.5));
+        let left = Surfaces { tip: &tip, reach: &reach, wood: &wood }.left(0.02, 1.5, 0.2).unwrap();
+        assert_eq!(left.cap_mm(DVec2::new(1.0, 2.0)), f64::NEG_INFINITY);
+        assert!(left.cap_mm(DVec2::new(3.4, 2.0)) < -3.0, "{}", left.cap_mm(DVec2::new(3.4, 2.0)));
+        assert_eq!(left.cap_mm(DVec2::new(6.0, 2.0)), f64::NEG_INFINITY);
+        // Nothing is left where the wood is as it should be.
+        assert!(Surfaces { tip: &tip, reach: &reach, wood: &reach }.left(0.02, 1.5, 0.2).is_none());
+    }
+}
