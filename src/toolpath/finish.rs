@@ -53,15 +53,11 @@ pub(super) fn finish(
     let reach = closing(&tip, &profile);
     let limit_mm = scallop_mm + SPARE * site.job.tolerance.gouge_mm;
     let stepover_mm = FRAC_1_SQRT_2 * stepover_mm;
-    let surfaces = Surfaces { tip: &tip, reach: &reach, wood: block.field() };
-    if let Some(left) = surfaces.left(limit_mm, profile.radius_mm(), stepover_mm) {
-        let wanted = |k: usize| left.is_wanted(k);
-        let lines = Waterlines { tip: &tip, wanted: &wanted, step_mm: stepover_mm, limit_mm };
-        waterlines(site, &lines, block, out)?;
-    }
+    let lines = Waterlines { tip: &tip, reach: &reach, step_mm: stepover_mm, limit_mm };
+    waterlines(site, &lines, block, out);
     for (turn, closer) in TURNS {
         let surfaces = Surfaces { tip: &tip, reach: &reach, wood: block.field() };
-        let Some(left) = surfaces.left(limit_mm, profile.radius_mm(), stepover_mm) else { break };
+        let Some(left) = surfaces.left(limit_mm, &profile, stepover_mm) else { break };
         let only = |p: DVec2| left.cap_mm(p);
         let (stepover_mm, angle_rad) = (closer * stepover_mm, angle_rad + turn);
         let across = Passes { stepover_mm, angle_rad, only: Some(&only) };

@@ -117,6 +117,12 @@ pub(crate) fn raster(cutter: CutterSpec, stepover: Stepover, angle_deg: f64) -> 
     }
 }
 
+/// A finishing operation with first passes along x.
+pub(crate) fn finish(cutter: CutterSpec, scallop_mm: f64) -> Operation {
+    let kind = OperationKind::Finish { scallop_mm, angle_rad: 0.0 };
+    Operation { kind, ..raster(cutter, Stepover::Plan(1.0), 0.0) }
+}
+
 /// A round bump or tower: centre, radius, height above the ground (both mm), and whether its side is a wall.
 #[derive(Debug, Clone)]
 pub(crate) struct Bump {

@@ -1,5 +1,6 @@
 //! Where wood is left above what the cutter can reach, and where its axis has to go to take it.
 
+use crate::cutter::Profile;
 use crate::geom::{DVec2, DVec3, Grid, Heightfield};
 use rayon::prelude::*;
 
@@ -28,12 +29,12 @@ pub(super) struct Left {
 impl Surfaces<'_> {
     /// The places for wood that stands more than `limit_mm` above what can be reached, normal to it; `None` when there
     /// is none.
-    pub(super) fn left(&self, limit_mm: f64, radius_mm: f64, stepover_mm: f64) -> Option<Left> {
+    pub(super) fn left(&self, limit_mm: f64, profile: &Profile, stepover_mm: f64) -> Option<Left> {
         let grid = *self.reach.grid();
         let found: Vec<Vec<usize>> = (0..grid.ny)
             .into_par_iter()
             .map(|j| {
-                let axis = |i| self.axis_for(i, j, limit_mm, radius_mm);
+                let axis = |i| self.axis_for(i, j, limit_mm, profile);
                 (0..grid.nx).filter_map(axis).collect()
             })
             .collect();
@@ -70,36 +71,37 @@ impl Surfaces<'_> {
 
     /// The node that the axis must pass by to take the wood at node (i, j) down to what can be reached; `None` when
     /// there is no more than `limit_mm`.
-    fn axis_for(&self, i: usize, j: usize, limit_mm: f64, radius_mm: f64) -> Option<usize> {
+    fn axis_for(&self, i: usize, j: usize, limit_mm: f64, profile: &Profile) -> Option<usize> {
         let grid = self.reach.grid();
-        let (last_i, last_j) = (grid.nx - 1, grid.ny - 1);
-        let z = |i: usize, j: usize| f64::from(self.reach.at(i, j));
-        let here = z(i, j);
+        let here = f64::from(self.reach.at(i, j));
         let gap = f64::from(self.wood.at(i, j)) - here;
         if gap <= limit_mm {
             return None;
         }
-        let (west, east) = (z(i.saturating_sub(1), j), z((i + 1).min(last_i), j));
-        let (south, north) = (z(i, j.saturating_sub(1)), z(i, (j + 1).min(last_j)));
         let above = grid.node(i, j).extend(here + gap);
         if self.is_within(above, i, j, limit_mm) {
             return None;
         }
-        // The axis stands one radius along the normal from the place it touches.
-        let slope = DVec2::new(east - west, north - south) / (2.0 * grid.pitch_mm);
-        let normal = -slope / (1.0 + slope.length_squared()).sqrt();
-        let at = grid.to_grid(grid.node(i, j) + normal * radius_mm).round();
-        let at = at.clamp(DVec2::ZERO, DVec2::new(last_i as f64, last_j as f64));
-        // At a wall the rounding must not end on top of it.
-        let (ci, cj) = (at.x as usize, at.y as usize);
-        let near = (cj.saturating_sub(1)..=(cj + 1).min(last_j)).flat_map(|j| {
-            (ci.saturating_sub(1)..=(ci + 1).min(last_i)).map(move |i| j * grid.nx + i)
+        // The cutter that comes lowest over this node.
+        let radius_mm = profile.radius_mm();
+        let reach = (radius_mm / grid.pitch_mm) as usize + 1;
+        let span = |k: usize, n: usize| k.saturating_sub(reach)..(k + reach + 1).min(n);
+        let node = grid.node(i, j);
+        let nodes = span(j, grid.ny).flat_map(|j| span(i, grid.nx).map(move |i| (i, j)));
+        let above = nodes.filter_map(|(i, j)| {
+            let height = profile.height_at(grid.node(i, j).distance(node))?;
+            Some((f64::from(self.tip.at(i, j)) + height, j * grid.nx + i))
         });
-        near.min_by(|&a, &b| self.tip.z()[a].total_cmp(&self.tip.z()[b]))
+        above.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, k)| k)
     }
 }
 
 impl Left {
+    #[cfg(test)]
+    pub(super) fn everywhere(grid: Grid) -> Self {
+        Self { grid, cap_mm: vec![f32::INFINITY; grid.len()] }
+    }
+
     /// True where the tip may go at all.
     pub(super) fn is_wanted(&self, node: usize) -> bool {
         self.cap_mm[node] > f32::NEG_INFINITY
@@ -161,6 +163,8 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
+    const BALL: Profile = Profile::Ball { radius_mm: 1.5 };
+
     proptest! {
         /// No point of a dense sample of the triangle is nearer, and one is nearly as near.
         #[test]
@@ -192,11 +196,14 @@ mod tests {
         let reach = Heightfield::from_fn(grid, |p| wall(p.x));
         let wood = Heightfield::from_fn(grid, |p| wall(p.x + 0.15));
         let tip = Heightfield::from_fn(grid, |p| wall(p.x + 1.5));
-        let left = Surfaces { tip: &tip, reach: &reach, wood: &wood }.left(0.02, 1.5, 0.2).unwrap();
+        let left =
+            Surfaces { tip: &tip, reach: &reach, wood: &wood }.left(0.02, &BALL, 0.2).unwrap();
         assert_eq!(left.cap_mm(DVec2::new(1.0, 2.0)), f64::NEG_INFINITY);
         assert!(left.cap_mm(DVec2::new(3.4, 2.0)) < -3.0, "{}", left.cap_mm(DVec2::new(3.4, 2.0)));
         assert_eq!(left.cap_mm(DVec2::new(6.0, 2.0)), f64::NEG_INFINITY);
         // Nothing is left where the wood is as it should be.
-        assert!(Surfaces { tip: &tip, reach: &reach, wood: &reach }.left(0.02, 1.5, 0.2).is_none());
+        assert!(
+            Surfaces { tip: &tip, reach: &reach, wood: &reach }.left(0.02, &BALL, 0.2).is_none()
+        );
     }
 }

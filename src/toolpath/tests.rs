@@ -1,7 +1,7 @@
 //! Laws of whole plans, held against brute force that shares no code with the planner.
 
 use super::fit::fit;
-use super::fixture::{Bump, cutter, job, raster, relief, rough};
+use super::fixture::{Bump, cutter, finish, job, raster, relief, rough};
 use super::trace::{Sample, Tracer};
 use super::*;
 use crate::cutter::Profile;
@@ -151,6 +151,42 @@ proptest! {
         let job = job(SIZE.x, SIZE.y, 10.0, 0.25, vec![op]);
         let target = relief(&job, 3.0, frame, &bumps);
         assert_no_gouge(&plan_quietly(&job, &target), &target);
+    }
+
+    #[test]
+    fn a_finish_never_gouges(bumps in bumps(SIZE, 3.0), d in prop::sample::select(vec![1.0, 2.0, 3.0])) {
+        let job = job(SIZE.x, SIZE.y, 10.0, 0.25, vec![finish(cutter(CutterShape::Ball, d), 0.02)]);
+        let target = relief(&job, 3.0, 0.0, &bumps);
+        assert_no_gouge(&plan_quietly(&job, &target), &target);
+    }
+
+    #[test]
+    fn a_finish_leaves_no_more_than_asked_wherever_the_cutter_reaches(bumps in bumps(SIZE, 3.0)) {
+        let cutters = [cutter(CutterShape::Flat, 2.0), cutter(CutterShape::Ball, 2.0)];
+        let [flat, ball] = cutters;
+        let job = job(SIZE.x, SIZE.y, 10.0, 0.2, vec![rough(flat, 0.3, 1.0), finish(ball, 0.02)]);
+        let target = relief(&job, 3.0, 0.0, &bumps);
+        let mut wood = Heightfield::flat(*target.grid(), 0.0);
+        let paths = plan_quietly(&job, &target);
+        for path in &paths {
+            for m in &path.moves {
+                lower(&mut wood, &Profile::of(&path.cutter), m);
+            }
+        }
+        let profile = Profile::Ball { radius_mm: 1.0 };
+        let reach = crate::offset::closing(&crate::offset::tip_field(&target, &profile), &profile);
+        let grid = *target.grid();
+        for j in 0..grid.ny {
+            for i in 0..grid.nx {
+                let p = grid.node(i, j).extend(f64::from(wood.at(i, j)));
+                let facets = triangles(&reach, p.truncate(), 0.5);
+                let left = facets.iter().map(|&t| distance_to_triangle(p, t));
+                let left = left.fold(f64::INFINITY, f64::min);
+                let gap = p.z - f64::from(reach.at(i, j));
+                // Scallop and gouge, and what the stamping of this test leaves between its stamps.
+                prop_assert!(gap <= 0.03 || left <= 0.03 + 0.001, "{left} at {p}, {gap} above");
+            }
+        }
     }
 
     #[test]
@@ -333,6 +369,7 @@ fn the_same_bytes_with_one_and_two_threads() {
         vec![
             rough(cutter(CutterShape::Flat, 3.0), 0.4, 1.5),
             raster(cutter(CutterShape::Ball, 2.0), Stepover::Scallop(0.02), 30.0),
+            finish(cutter(CutterShape::Ball, 1.5), 0.02),
         ],
     );
     let wall = Bump { at: DVec2::new(9.0, 9.0), radius_mm: 4.0, height_mm: 2.5, wall: true };

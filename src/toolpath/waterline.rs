@@ -7,9 +7,9 @@
 //! up, and only where wood is left.
 
 use super::Site;
-use super::ToolpathError;
 use super::chain::{Span, chains};
 use super::emit::Emitter;
+use super::left::{Left, Surfaces};
 use super::raster::{TOP_MM, link};
 use super::trace::{DROP_MM, Tracer};
 use crate::cutter::Profile;
@@ -36,11 +36,11 @@ const PUSH_MM: f64 = 0.2;
 pub(super) struct Waterlines<'a> {
     /// Lowest heights of the tip at the nodes.
     pub(super) tip: &'a Heightfield,
-    /// Where they are wanted, by node.
-    pub(super) wanted: &'a (dyn Fn(usize) -> bool + Sync),
+    /// The lowest surface that the cutter can leave.
+    pub(super) reach: &'a Heightfield,
     /// Height between levels, mm.
     pub(super) step_mm: f64,
-    /// Wood that may be left above a level, mm.
+    /// Wood that may be left, mm normal to `reach`.
     pub(super) limit_mm: f64,
 }
 
@@ -51,40 +51,44 @@ struct Steep {
     high: f32,
 }
 
-/// Plans the levels, from the bottom up, and takes them out of `block`. The moves go to `out`.
-pub(super) fn waterlines(
-    site: &Site,
-    lines: &Waterlines,
-    block: &mut Block,
-    out: &mut Emitter,
-) -> Result<(), ToolpathError> {
+/// Plans the levels, from the bottom up, each where wood is left by then, and takes them out of `block`. The moves
+/// go to `out`.
+pub(super) fn waterlines(site: &Site, lines: &Waterlines, block: &mut Block, out: &mut Emitter) {
     let profile = Profile::of(&site.operation.cutter);
-    let cells = lines.cells();
+    let left = |block: &Block| {
+        let surfaces = Surfaces { tip: lines.tip, reach: lines.reach, wood: block.field() };
+        surfaces.left(lines.limit_mm, &profile, lines.step_mm)
+    };
+    let Some(mut wanted) = left(block) else { return };
+    let mut cells = lines.cells(&wanted);
     let low = cells.iter().map(|c| c.low).fold(f32::INFINITY, f32::min);
     let high = cells.iter().map(|c| c.high).fold(f32::NEG_INFINITY, f32::max);
     let (low, high) = (f64::from(low) + ABOVE_GROUND_MM, f64::from(high).min(TOP_MM));
-    if low.is_nan() || high <= low {
-        return Ok(());
+    if high <= low {
+        return;
     }
     let exact = Dropper::new(site.target, profile);
     let pitch_mm = site.target.grid().pitch_mm;
-    let tracer =
-        Tracer::new(|p: DVec2| exact.drop(p), profile, pitch_mm, site.job.tolerance.fit_mm);
+    let fit_mm = site.job.tolerance.fit_mm;
+    let tracer = Tracer::new(|p: DVec2| exact.drop(p), profile, pitch_mm, fit_mm);
     let slim = Dropper::new(site.target, profile.slimmed(DROP_MM));
     let levels = ((high - low) / lines.step_mm).ceil() as usize;
     for k in 0..levels {
         let z = low + k as f64 * lines.step_mm;
         let contours = lines.contours(&cells, z, &exact);
-        let wood = Dropper::new(block.field(), profile);
         let free = |p: DVec2| slim.drop(p) <= z + DROP_MM;
         let spans: Vec<Span> = contours
             .par_iter()
             .flat_map_iter(|contour| {
-                let runs = runs_with(contour, |p| wood.drop(p) > z + lines.limit_mm);
-                runs.into_iter().flat_map(|run| chords(&run, site.job.tolerance.fit_mm, free))
+                let runs = runs_with(contour, |p| wanted.cap_mm(p) > f64::NEG_INFINITY);
+                runs.into_iter().flat_map(|run| chords(&run, fit_mm, free))
             })
             .map(|plan| plan.into_iter().map(|p| p.extend(z)).collect())
             .collect();
+        if spans.is_empty() {
+            continue;
+        }
+        let wood = Dropper::new(block.field(), profile);
         let link = |done: &[DVec3], next: &[DVec3]| link(site, &tracer, done, next);
         let before = out.moves().len();
         for chain in chains(nearest_first(spans), link) {
@@ -92,18 +96,21 @@ pub(super) fn waterlines(
             out.chain(&chain, touch_mm);
         }
         block.cut(&profile, &out.moves()[before..]);
+        // The flank may have cleared the walls above.
+        let Some(still) = left(block) else { return };
+        wanted = still;
+        cells = lines.cells(&wanted);
     }
-    Ok(())
 }
 
 impl Waterlines<'_> {
     /// The cells with a wanted corner.
-    fn cells(&self) -> Vec<Steep> {
+    fn cells(&self, wanted: &Left) -> Vec<Steep> {
         let grid = self.tip.grid();
         let z = self.tip.z();
         let cell = |node: usize| {
             let corners = [node, node + 1, node + grid.nx, node + grid.nx + 1];
-            corners.iter().any(|&k| (self.wanted)(k)).then(|| {
+            corners.iter().any(|&k| wanted.is_wanted(k)).then(|| {
                 let heights = corners.map(|k| z[k]);
                 let low = heights.into_iter().fold(f32::INFINITY, f32::min);
                 let high = heights.into_iter().fold(f32::NEG_INFINITY, f32::max);
@@ -315,4 +322,79 @@ fn nearest_first(spans: Vec<Span>) -> Vec<Vec<Span>> {
         rows.push(vec![span]);
     }
     rows
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geom::signed_area;
+
+    fn lines(tip: &Heightfield) -> Waterlines<'_> {
+        Waterlines { tip, reach: tip, step_mm: 0.5, limit_mm: 0.01 }
+    }
+
+    /// A cone under a thin cutter: its contours are circles, run with the cone on the right.
+    #[test]
+    fn the_contours_of_a_cone_are_circles_run_clockwise() {
+        let grid = Grid::covering(DVec2::ZERO, 20.0, 20.0, 0.25).unwrap();
+        let middle = DVec2::splat(10.0);
+        let cone = Heightfield::from_fn(grid, |p| (-0.5 * p.distance(middle)).max(-4.0));
+        let profile = Profile::Flat { radius_mm: 1e-6 };
+        let exact = Dropper::new(&cone, profile);
+        let lines = lines(&cone);
+        let cells = lines.cells(&Left::everywhere(grid));
+        for (z, r) in [(-1.0, 2.0), (-2.0, 4.0), (-3.5, 7.0)] {
+            let contours = lines.contours(&cells, z, &exact);
+            assert_eq!(contours.len(), 1);
+            let ring = &contours[0];
+            assert_eq!(ring[0], ring[ring.len() - 1]);
+            assert!(ring.iter().all(|p| (p.distance(middle) - r).abs() < 0.005), "{z}");
+            let area = signed_area(&ring[1..]);
+            assert!((area + std::f64::consts::PI * r * r).abs() < 0.02 * r * r, "{area}");
+        }
+    }
+
+    /// Two hills that meet in a saddle: one contour above it makes two rings, below it one.
+    #[test]
+    fn a_saddle_joins_or_parts_the_rings() {
+        let grid = Grid::covering(DVec2::ZERO, 24.0, 12.0, 0.5).unwrap();
+        let hill = |p: DVec2, x: f64| libm::exp(-p.distance_squared(DVec2::new(x, 6.0)) / 8.0);
+        let hills = Heightfield::from_fn(grid, |p| 3.0 * (hill(p, 8.0) + hill(p, 16.0)) - 4.0);
+        let exact = Dropper::new(&hills, Profile::Flat { radius_mm: 1e-6 });
+        let lines = lines(&hills);
+        let cells = lines.cells(&Left::everywhere(grid));
+        // The saddle lies at 3 * 2 exp(-2) - 4 = -3.19.
+        assert_eq!(lines.contours(&cells, -3.0, &exact).len(), 2);
+        assert_eq!(lines.contours(&cells, -3.4, &exact).len(), 1);
+    }
+
+    #[test]
+    fn chords_are_few_stay_near_and_keep_clear() {
+        let n = 400;
+        let circle: Vec<DVec2> = (0..=n)
+            .map(|k| DVec2::from_angle(-std::f64::consts::TAU * f64::from(k) / f64::from(n)) * 5.0)
+            .collect();
+        // The ground is inside the circle, which runs clockwise round it: chords would cut into it.
+        let free = |p: DVec2| p.length() >= 5.0 - 0.003;
+        let pieces = chords(&circle, 0.01, free);
+        assert_eq!(pieces.len(), 1);
+        let piece = &pieces[0];
+        // A chord with a sagitta of 0.003 mm spans 2 sqrt(2 * 5 * 0.003) = 0.35 mm.
+        let least = std::f64::consts::TAU * 5.0 / 0.35;
+        assert!((piece.len() as f64) < 1.3 * least && piece.len() as f64 > 0.8 * least);
+        for pair in piece.windows(2) {
+            assert!(checked(pair[0], pair[1], free));
+        }
+    }
+
+    #[test]
+    fn only_stretches_with_work_are_cut() {
+        let line: Vec<DVec2> = (0..=200).map(|k| DVec2::new(0.1 * f64::from(k), 0.0)).collect();
+        let work = |p: DVec2| (3.0..5.0).contains(&p.x) || (6.0..7.0).contains(&p.x) || p.x > 15.0;
+        let runs = runs_with(&line, work);
+        assert_eq!(runs.len(), 2);
+        let ends = |run: &[DVec2]| (run[0].x, run[run.len() - 1].x);
+        assert!((ends(&runs[0]).0 - 2.7).abs() < 0.11 && (ends(&runs[0]).1 - 7.2).abs() < 0.11);
+        assert!((ends(&runs[1]).0 - 14.8).abs() < 0.11 && (ends(&runs[1]).1 - 20.0).abs() < 1e-9);
+    }
 }

@@ -67,7 +67,12 @@ fn wrong_types_say_what_there_is_and_what_is_wanted() {
     refused(&with("at = [1, \"2\"]\n"), kind, (3, 10), &["this is text"]);
     refused(&with("font_dirs = \"fonts\"\n"), kind, (3, 13), &["a list of texts"]);
     refused(&with("[relief]\nbackground = 3\n"), kind, (4, 14), &["leave_mm = N"]);
-    refused(&with("[[operation]]\nkind = 3\n"), kind, (4, 8), &["\"rough\" or \"raster\""]);
+    refused(
+        &with("[[operation]]\nkind = 3\n"),
+        kind,
+        (4, 8),
+        &["\"rough\", \"finish\" or \"raster\""],
+    );
     refused(&with("[layer]\nselect = \"all\"\n"), kind, (3, 1), &["[[layer]]"]);
     refused("artwork = 3\n", kind, (1, 11), &["an [artwork] table"]);
 }
@@ -121,7 +126,7 @@ fn unknown_names_name_the_nearest() {
     let cutter = with("[[operation]]\nkind = \"raster\"\ncutter = \"ball3\"\n");
     refused(&cutter, kind, (5, 10), &["did you mean \"ball-3\"?"]);
     let contour = with("[[operation]]\nkind = \"contour\"\n");
-    refused(&contour, kind, (4, 8), &["contour", "there is: rough, raster"]);
+    refused(&contour, kind, (4, 8), &["contour", "there is: rough, finish, raster"]);
     let layer = |line: &str| with(&format!("[[layer]]\nselect = \"all\"\n{line}\n"));
     refused(
         &layer("surface = \"rule\""),
