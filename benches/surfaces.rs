@@ -6,7 +6,9 @@
 #[path = "../tests/shapes/mod.rs"]
 mod shapes;
 
-use shapes::measure::{CREASES, Measures, Method, Outline, Raised, crease, raise_all, summary};
+use shapes::measure::{
+    CREASES, Ladder, Measures, Method, Outline, Raised, crease, raise_all, summary,
+};
 use shapes::{FINE, shapes};
 use std::time::Instant;
 
@@ -49,6 +51,12 @@ fn main() {
             }
             println!(" {}k | {seconds:.2} |", faces / all.len() / 1000);
         }
+    }
+    println!("\n| shape | rungs 0.1 apart | least step | largest step | imbalance rms |");
+    println!("|---|---|---|---|---|");
+    for shape in &all {
+        let Ladder { count, steps: [least, most], imbalance } = Ladder::of(shape);
+        println!("| {} | {count} | {least:.4} | {most:.4} | {imbalance:.4} |", shape.name);
     }
     println!("\n| seam | shape | median, degrees | 95 % |");
     println!("|---|---|---|---|");

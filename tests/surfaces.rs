@@ -5,7 +5,9 @@ mod shapes;
 
 use relievo::geom::DVec2;
 use relievo::outline::Region;
-use shapes::measure::{CREASES, Measures, Method, Outline, Raised, crease, raise_all, summary};
+use shapes::measure::{
+    CREASES, Ladder, Measures, Method, Outline, Raised, crease, raise_all, summary,
+};
 use shapes::{FINE, Shape, shapes, solid};
 
 /// A figure counts as reproduced when it is off by no more than this part.
@@ -86,4 +88,20 @@ fn a_long_thin_strip_is_raised() {
     // A slope of 4 over half a width of 0.2 mm, as the parabola has it: h = 4 * 0.2 / 2.
     let top = mesh.vertices.iter().map(|v| v.z).fold(0.0, f64::max);
     assert!((top - 0.4).abs() < 1e-9, "{top}");
+}
+
+/// The rungs stand at even steps of nearly the wanted 0.1, and their middles as far from one side as from the other.
+#[test]
+fn rungs_are_even_and_symmetric() {
+    let all = shapes(FINE);
+    for (name, count, imbalance) in
+        [("ring", 315, 0.00005), ("leaf", 0, 0.015), ("C-scroll", 305, 0.008), ("S", 0, 0.008)]
+    {
+        let shape = all.iter().find(|s| s.name == name).unwrap();
+        let got = Ladder::of(shape);
+        assert!(got.steps[0] > 0.097 && got.steps[1] <= 0.1 + 1e-9, "{name}: {got:?}");
+        assert!(got.imbalance <= imbalance, "{name}: {got:?}");
+        // 1 % of the tabled number.
+        assert!(count == 0 || got.count.abs_diff(count) * 100 <= count, "{name}: {got:?}");
+    }
 }
