@@ -10,7 +10,7 @@ use super::chain::{Span, chains};
 use super::emit::{Emitter, feed_seconds, lift_seconds};
 use super::fit::fit;
 use super::rough::{Rough, rough};
-use super::rows::{Row, rows, slanted_rim};
+use super::rows::{Row, rim, rows, slanted_rim};
 use super::trace::{Sample, Tracer};
 use super::{Site, ToolpathError};
 use crate::cutter::Profile;
@@ -113,9 +113,11 @@ pub(super) fn passes(
 
     let bounds = site.job.stock.bounds();
     let mut rows = rows(&bounds, cut.angle_rad, cut.stepover_mm);
-    if cut.only.is_none() {
-        rows.extend(slanted_rim(&bounds, cut.angle_rad));
-    }
+    rows.extend(match cut.only {
+        None => slanted_rim(&bounds, cut.angle_rad),
+        // A corner of the stock may be the only place from which the cutter reaches down beside a wall.
+        Some(_) => rim(&bounds),
+    });
     let spans: Vec<Vec<Span>> =
         rows.into_par_iter().map(|row| row_spans(site, cut, &row, &tracer)).collect();
     let deepest_mm = deepest_pass_mm(&spans, block, site.operation.cutter.diameter_mm);

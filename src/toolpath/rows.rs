@@ -39,9 +39,11 @@ pub(super) fn rows(bounds: &Bounds, angle_rad: f64, spacing_mm: f64) -> Vec<Row>
 /// that half a spacing again.
 pub(super) fn slanted_rim(bounds: &Bounds, angle_rad: f64) -> Vec<Row> {
     let across = normal(angle_rad);
-    if across.x == 0.0 || across.y == 0.0 {
-        return Vec::new();
-    }
+    if across.x == 0.0 || across.y == 0.0 { Vec::new() } else { rim(bounds) }
+}
+
+/// The sides of the rectangle as rows, one after the other.
+pub(super) fn rim(bounds: &Bounds) -> Vec<Row> {
     let (a, b) = (bounds.min, bounds.max);
     let corners = [b, DVec2::new(a.x, b.y), a, DVec2::new(b.x, a.y), b];
     corners.windows(2).map(|side| Row { from: side[0], to: side[1] }).collect()
