@@ -36,13 +36,13 @@ fn a_wall_overcut_by_a_fiftieth_is_caught_at_any_place_in_the_cell() {
             if shape == CutterShape::Ball && z + 1.5 > -0.1 {
                 continue;
             }
-            let v = along(shape, x + 0.02, z);
+            let v = along(shape.clone(), x + 0.02, z);
             let f = v.failures.iter().find(|f| f.kind == FailureKind::Gouge);
             let f = f.unwrap_or_else(|| panic!("{shape:?} at {z} passes"));
             assert!([10, 11].contains(&f.line), "{f}");
             assert!((f.amount - 0.02).abs() < 2e-3, "{shape:?} {z}: {f}");
             assert_eq!(v.gouge.unwrap().depth_mm, f.amount);
-            let v = along(shape, x + 0.008, z);
+            let v = along(shape.clone(), x + 0.008, z);
             assert!(v.passed(), "{shape:?} {z}: {:#?}", v.failures);
         }
     }
