@@ -153,4 +153,6 @@ pub fn prove(
 }
 
 #[cfg(test)]
+mod forms_tests;
+#[cfg(test)]
 mod tests;
