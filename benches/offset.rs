@@ -11,6 +11,7 @@ use std::time::Instant;
 
 use relievo::cutter::Profile;
 use relievo::geom::{DVec2, Grid, Heightfield};
+use relievo::job::{CutterShape, CutterSpec};
 use relievo::offset::{Dropper, closing, tip_field};
 
 const PITCH_MM: f64 = 0.1;
@@ -32,28 +33,58 @@ fn main() {
                 "| cutter | tip field 1T ms | 2T ms | x copy | plain loop / 1T | closing 1T ms | drops/s 1T | on lines |"
             );
             println!("|---|---|---|---|---|---|---|---|");
-            for diameter_mm in [3.0, 6.0, 12.0] {
-                row(field, Profile::Ball { radius_mm: diameter_mm * 0.5 }, copy_ms, &pools);
+            for (name, profile) in cutters() {
+                row(field, &name, &profile, copy_ms, &pools);
             }
-            row(field, Profile::Flat { radius_mm: 3.0 }, copy_ms, &pools);
         }
     }
 }
 
-fn row(field: &Heightfield, profile: Profile, copy_ms: f64, pools: &[rayon::ThreadPool; 2]) {
+/// Every form of cutter, and balls of three sizes.
+fn cutters() -> Vec<(String, Profile)> {
+    let cutters = [
+        (CutterShape::Ball, 3.0),
+        (CutterShape::Ball, 6.0),
+        (CutterShape::Ball, 12.0),
+        (CutterShape::Flat, 6.0),
+        (CutterShape::Bull { corner_mm: 1.0 }, 6.0),
+        (CutterShape::V { angle_rad: std::f64::consts::FRAC_PI_3, tip_mm: 0.2 }, 6.0),
+        (CutterShape::Tapered { tip_mm: 1.0, taper_rad: 5.4_f64.to_radians() }, 6.0),
+        (CutterShape::Table { profile: vec![(0.5, 0.0), (2.0, 0.5), (3.0, 2.0)] }, 6.0),
+    ];
+    let named = |(shape, diameter_mm): (CutterShape, f64)| {
+        let name = format!("{} {diameter_mm}", shape.word());
+        let cutter = CutterSpec {
+            name: name.clone(),
+            shape,
+            diameter_mm,
+            flutes: 2,
+            flute_mm: 40.0,
+            shank_mm: diameter_mm,
+            stickout_mm: 40.0,
+            holder_mm: 20.0,
+        };
+        (name, Profile::of(&cutter))
+    };
+    cutters.into_iter().map(named).collect()
+}
+
+fn row(
+    field: &Heightfield,
+    name: &str,
+    profile: &Profile,
+    copy_ms: f64,
+    pools: &[rayon::ThreadPool; 2],
+) {
     let runs = if field.grid().len() > 4_000_000 { 2 } else { 5 };
-    let one = pools[0].install(|| cpu_ms(runs, || tip_field(field, &profile)));
-    let two = pools[1].install(|| best_ms(runs, || tip_field(field, &profile)));
-    let closing_ms = pools[0].install(|| cpu_ms(runs, || closing(field, &profile)));
+    let one = pools[0].install(|| cpu_ms(runs, || tip_field(field, profile)));
+    let two = pools[1].install(|| best_ms(runs, || tip_field(field, profile)));
+    let closing_ms = pools[0].install(|| cpu_ms(runs, || closing(field, profile)));
     // The plain loop's cost goes with the number of nodes: a strip of rows is enough.
     let rows = (20_000_000 / field.grid().nx / 100).clamp(1, 40);
     let plain_ms =
-        best_ms(1, || plain_rows(field, &profile, rows)) * field.grid().ny as f64 / rows as f64;
-    let (drops, on_lines) = drops_per_s(field, profile);
-    let name = match profile {
-        Profile::Flat { radius_mm } => format!("flat {}", radius_mm * 2.0),
-        _ => format!("ball {}", profile.radius_mm() * 2.0),
-    };
+        best_ms(1, || plain_rows(field, profile, rows)) * field.grid().ny as f64 / rows as f64;
+    let (drops, on_lines) = drops_per_s(field, profile.clone());
     println!(
         "| {name} | {one:.1} | {two:.1} | {:.0} | {:.0} | {closing_ms:.1} | {:.2} M | {:.2} M |",
         one / copy_ms,

@@ -1,9 +1,14 @@
 //! Cutter shapes: height of the profile at a radius, tip, flank, shank, holder.
 
+mod turned;
+
+use std::sync::Arc;
+
 use crate::job::{CutterShape, CutterSpec};
+pub use turned::Turned;
 
 /// The cutting end of a cutter as a surface of revolution about the z axis, tip at height 0.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub enum Profile {
     /// A flat disc of this radius, mm.
@@ -16,22 +21,34 @@ pub enum Profile {
         /// Radius of the sphere, mm.
         radius_mm: f64,
     },
+    /// Any other convex end: bull nose, V, tapered ball, table.
+    Turned(Arc<Turned>),
 }
 
 impl Profile {
     /// The cutting end of a cutter.
     pub fn of(spec: &CutterSpec) -> Self {
         let radius_mm = spec.diameter_mm * 0.5;
-        match spec.shape {
-            CutterShape::Flat => Self::Flat { radius_mm },
-            CutterShape::Ball => Self::Ball { radius_mm },
-        }
+        let turned = match spec.shape {
+            CutterShape::Flat => return Self::Flat { radius_mm },
+            CutterShape::Ball => return Self::Ball { radius_mm },
+            CutterShape::Bull { corner_mm } => Turned::bull(radius_mm, corner_mm),
+            CutterShape::V { angle_rad, tip_mm } => {
+                Turned::cone(radius_mm, tip_mm * 0.5, angle_rad * 0.5)
+            }
+            CutterShape::Tapered { tip_mm, taper_rad } => {
+                Turned::tapered(radius_mm, tip_mm * 0.5, taper_rad)
+            }
+            CutterShape::Table { ref profile } => Turned::table(profile),
+        };
+        Self::Turned(Arc::new(turned))
     }
 
     /// Largest radius, mm.
     pub fn radius_mm(&self) -> f64 {
         match *self {
             Self::Flat { radius_mm } | Self::Ball { radius_mm } => radius_mm,
+            Self::Turned(ref form) => form.radius_mm(),
         }
     }
 
@@ -41,6 +58,7 @@ impl Profile {
             _ if r_mm > self.radius_mm() => None,
             Self::Flat { .. } => Some(0.0),
             Self::Ball { radius_mm: r } => Some(r - (r * r - r_mm * r_mm).max(0.0).sqrt()),
+            Self::Turned(ref form) => Some(form.height(r_mm)),
         }
     }
 
@@ -50,34 +68,33 @@ impl Profile {
         match *self {
             Self::Flat { radius_mm } => Self::Flat { radius_mm: (radius_mm - by_mm).max(0.0) },
             Self::Ball { radius_mm } => Self::Ball { radius_mm: (radius_mm - by_mm).max(0.0) },
+            Self::Turned(ref form) => Self::Turned(Arc::new(form.slimmed(by_mm))),
         }
     }
 
     /// A cutting end that keeps at least `leave_mm` of wood, measured normal to the target, when its tip
     /// rides [`Profile::height_at`]-deep on the target and is then raised by `leave_mm`: the Minkowski sum
-    /// with a ball for a ball, a disc around that sum (safe, a little more wood stays) for a flat.
+    /// with a ball, for a flat a disc around that sum (safe, a little more wood stays).
     #[must_use]
     pub fn inflated(&self, leave_mm: f64) -> Self {
         match *self {
             Self::Flat { radius_mm } => Self::Flat { radius_mm: radius_mm + leave_mm },
             Self::Ball { radius_mm } => Self::Ball { radius_mm: radius_mm + leave_mm },
+            Self::Turned(ref form) => Self::Turned(Arc::new(form.inflated(leave_mm))),
+        }
+    }
+
+    /// A cutting end around this one, on the same tip, that has no edges sharper than a ball of `least_mm`: chords between
+    /// its exact places enter the target no deeper than such a ball would. Flats have laws of their own and stay.
+    #[must_use]
+    pub fn rolled(&self, least_mm: f64) -> Self {
+        match *self {
+            Self::Flat { .. } | Self::Ball { .. } => self.clone(),
+            Self::Turned(ref form) if form.roundness_mm() >= least_mm => self.clone(),
+            Self::Turned(ref form) => Self::Turned(Arc::new(form.rolled(least_mm))),
         }
     }
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn profiles_have_their_analytic_heights() {
-        let ball = Profile::Ball { radius_mm: 2.5 };
-        assert_eq!(ball.height_at(0.0), Some(0.0));
-        assert_eq!(ball.height_at(1.5), Some(0.5));
-        assert_eq!(ball.height_at(2.5), Some(2.5));
-        assert_eq!(ball.height_at(2.6), None);
-        let flat = Profile::Flat { radius_mm: 3.0 };
-        assert_eq!(flat.height_at(3.0), Some(0.0));
-        assert_eq!(flat.height_at(3.001), None);
-    }
-}
+pub(crate) mod tests;

@@ -8,6 +8,7 @@ mod keys;
 mod error;
 mod colors;
 mod reader;
+mod cutter;
 mod library;
 mod draft;
 mod speeds;

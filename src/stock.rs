@@ -1,14 +1,16 @@
 //! The wood as a heightfield; removes plain moves of a cutter from it.
 //!
-//! [`Block::cut`] takes away the exact volume that flat and ball cutters sweep along straight moves of any
+//! [`Block::cut`] takes away the exact volume that a cutter sweeps along straight moves of any
 //! direction, plunges and retracts included, and says for each move what it met. Rapids cut like any
 //! other move, so that one that runs into wood shows.
 
+mod drawn;
 mod sweep;
 
-use crate::cutter::Profile;
+use crate::cutter::{Profile, Turned};
 use crate::geom::{DVec2, DVec3, Grid, Heightfield, Move};
 use crate::job::Stock;
+use drawn::Drawn;
 use rayon::prelude::*;
 use sweep::{Joint, Left, SPAN_SLACK_MM, Span, Sweep, Tip};
 
@@ -106,7 +108,9 @@ impl Block {
         moves: &[Move],
         alone: impl Fn(usize) -> bool + Sync,
     ) -> Vec<Contact> {
-        let mut contacts = vec![Contact::default(); moves.len()];
+        if let Profile::Turned(form) = profile {
+            return self.cut_turned(form, profile, moves, alone);
+        }
         let tip = Tip::of(profile);
         let slim = Tip::of(&profile.slimmed(RAPID_SLIM_MM));
         // A wedge up to a few nodes wide costs less as part of a strip than as a stamp of its own.
@@ -121,9 +125,54 @@ impl Block {
                 _ => Joint::None,
             })
             .collect();
-        let lattice = Lattice::new(*self.field.grid());
         let top_mm = self.top_mm;
-        let bins = self.bins(tip.radius, moves);
+        self.carve(tip.radius, moves, |band, k, contact| {
+            let ends = [joints[k], joints[k + 1]];
+            let tip_here = if moves[k].is_rapid() { slim } else { tip };
+            band.carve(&Sweep::of(&moves[k], tip_here, ends), contact);
+            if ends[1] == Joint::Wedge
+                && moves[k].to.z < top_mm
+                && let Some(wedge) = Sweep::wedge(&moves[k], &moves[k + 1], tip)
+            {
+                band.carve(&wedge, contact);
+            }
+        })
+    }
+
+    /// [`Block::cut_alone`] for any convex end. In a chain a move leaves to the one before it what that one cuts no
+    /// higher: the nodes over which the tip would be lowest before the move begins.
+    fn cut_turned(
+        &mut self,
+        form: &Turned,
+        profile: &Profile,
+        moves: &[Move],
+        alone: impl Fn(usize) -> bool + Sync,
+    ) -> Vec<Contact> {
+        let Profile::Turned(slim) = profile.slimmed(RAPID_SLIM_MM) else {
+            unreachable!("a slimmer form is of the same kind");
+        };
+        let goes_on = |k: usize| {
+            let (a, b) = (&moves[k - 1], &moves[k]);
+            a.to == b.from && a.is_rapid() == b.is_rapid() && !alone(k - 1) && !alone(k)
+        };
+        self.carve(form.radius_mm(), moves, |band, k, contact| {
+            let m = &moves[k];
+            let form = if m.is_rapid() { &*slim } else { form };
+            let follows = k > 0 && goes_on(k);
+            band.carve(&Sweep::Turned(Drawn::of(m, form, follows)), contact);
+        })
+    }
+
+    /// Carves every band with its moves, in order: `one` removes what move k takes from a band.
+    fn carve(
+        &mut self,
+        radius_mm: f64,
+        moves: &[Move],
+        one: impl Fn(&mut Band, usize, &mut Contact) + Sync,
+    ) -> Vec<Contact> {
+        let mut contacts = vec![Contact::default(); moves.len()];
+        let lattice = Lattice::new(*self.field.grid());
+        let bins = self.bins(radius_mm, moves);
         let parts: Vec<Vec<(u32, Contact)>> = self
             .field
             .z_mut()
@@ -134,17 +183,8 @@ impl Block {
                 let mut band = Band { lattice, row0: b * BAND_ROWS, z };
                 let mut met = Vec::new();
                 for k in bin {
-                    let i = k as usize;
                     let mut contact = Contact::default();
-                    let ends = [joints[i], joints[i + 1]];
-                    let tip_here = if moves[i].is_rapid() { slim } else { tip };
-                    band.carve(&Sweep::of(&moves[i], tip_here, ends), &mut contact);
-                    if ends[1] == Joint::Wedge
-                        && moves[i].to.z < top_mm
-                        && let Some(wedge) = Sweep::wedge(&moves[i], &moves[i + 1], tip)
-                    {
-                        band.carve(&wedge, &mut contact);
-                    }
+                    one(&mut band, k as usize, &mut contact);
                     if contact.deepest_mm > 0.0 {
                         met.push((k, contact));
                     }
@@ -264,6 +304,7 @@ fn for_nodes(lattice: &Lattice, sweep: &Sweep, j: usize, f: impl FnMut(usize, Le
     match sweep {
         Sweep::Stamp(s) => lattice.visit(j, s.anchor(), |dy| s.spans(dy), |d| s.left(d), f),
         Sweep::Along(a) => lattice.visit(j, a.anchor(), |dy| a.spans(dy), |d| a.left(d), f),
+        Sweep::Turned(t) => lattice.visit(j, t.anchor(), |dy| t.spans(dy), |d| t.left(d), f),
     }
 }
 

@@ -48,7 +48,7 @@ pub(super) fn cutters(args: &Args) -> Result<(), Stop> {
         "name", "shape", "diameter mm", "flutes", "flute mm", "shank mm"
     );
     for c in library.cutters() {
-        let shape = format!("{:?}", c.shape).to_lowercase();
+        let shape = c.shape.word();
         text += &format!(
             "{:<14}{shape:<8}{:>12}{:>9}{:>10}{:>10}\n",
             c.name, c.diameter_mm, c.flutes, c.flute_mm, c.shank_mm

@@ -199,10 +199,7 @@ fn cutters(job: &Job) -> Vec<CutterRow> {
         }
         rows.push(CutterRow {
             name: cutter.name.clone(),
-            shape: match cutter.shape {
-                CutterShape::Flat => "flat end".into(),
-                CutterShape::Ball => "ball nose".into(),
-            },
+            shape: form(&cutter.shape),
             diameter_mm: cutter.diameter_mm,
             flutes: cutter.flutes,
             flute_mm: cutter.flute_mm,
@@ -210,6 +207,25 @@ fn cutters(job: &Job) -> Vec<CutterRow> {
         });
     }
     rows
+}
+
+/// The form of a cutting end, for people.
+fn form(shape: &CutterShape) -> String {
+    // Degrees that were written with decimals come back through radians.
+    let degrees = |radians: f64| (radians.to_degrees() * 1e6).round() / 1e6;
+    match *shape {
+        CutterShape::Flat => "flat end".to_owned(),
+        CutterShape::Ball => "ball nose".to_owned(),
+        CutterShape::Bull { corner_mm } => format!("bull nose, corner {corner_mm} mm"),
+        CutterShape::V { angle_rad, tip_mm: 0.0 } => format!("V, {} degrees", degrees(angle_rad)),
+        CutterShape::V { angle_rad, tip_mm } => {
+            format!("V, {} degrees, tip {tip_mm} mm", degrees(angle_rad))
+        }
+        CutterShape::Tapered { tip_mm, taper_rad } => {
+            format!("tapered ball, tip {tip_mm} mm, {} degrees per side", degrees(taper_rad))
+        }
+        CutterShape::Table { .. } => "profile of its own".to_owned(),
+    }
 }
 
 /// What was checked and what was found, one line each.

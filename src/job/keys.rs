@@ -135,7 +135,7 @@ pub(super) const PROFILES: &[&str] = &["parabola", "round", "chamfer", "cove", "
 pub(super) const COMBINES: &[&str] =
     &["base", "add", "max", "min", "subtract", "multiply", "replace"];
 /// Names of [`super::CutterShape`], in its order.
-pub(super) const SHAPES: &[&str] = &["flat", "ball"];
+pub(super) const SHAPES: &[&str] = &["flat", "ball", "bull", "v", "tapered", "table"];
 /// Surface methods that there are.
 pub(super) const METHODS: &[&str] = &["ruled", "ratio", "profile"];
 /// Names of [`super::Prune`], in its order.
@@ -671,6 +671,36 @@ pub(super) static CUTTER: Section = Section {
         key("name", Kind::Text, Rule("shape and diameter"), "name for messages and file names"),
         key("shape", Kind::Choice(SHAPES), Required, "form of the cutting end"),
         key("diameter_mm", mm(0.05, 100.0), Required, "cutting diameter"),
+        key(
+            "corner_mm",
+            mm(0.001, 50.0),
+            Rule("nothing; a bull cutter needs it"),
+            "bull: radius of the rounded corner",
+        ),
+        key(
+            "angle_deg",
+            deg(1.0, 175.0),
+            Rule("nothing; a v cutter needs it"),
+            "v: angle of the whole cone",
+        ),
+        key(
+            "tip_mm",
+            mm(0.0, 100.0),
+            Rule("v: 0, pointed; a tapered cutter needs it"),
+            "v: diameter of the flat at the tip; tapered: diameter of the ball",
+        ),
+        key(
+            "taper_deg",
+            deg(0.1, 80.0),
+            Rule("nothing; a tapered cutter needs it"),
+            "tapered: angle per side, between the axis and the side of the cone",
+        ),
+        key(
+            "profile",
+            Kind::Pairs { what: "radius", low: 0.0, high: 50.0, min: 0.0, max: 300.0, unit: "mm" },
+            Rule("nothing; a table cutter needs it"),
+            "table: [radius, height above the tip] from the tip outward; the slope never falls",
+        ),
         key("flutes", Kind::Whole { min: 1, max: 12 }, Number(2.0), "number of cutting edges"),
         key("flute_mm", mm(0.1, 300.0), Required, "length of the cutting edges, from the tip"),
         key("shank_mm", mm(0.1, 100.0), Rule("the diameter"), "diameter of the shank"),

@@ -4,10 +4,11 @@ use std::collections::BTreeMap;
 
 use toml::de::DeValue;
 
+use super::cutter::read_cutter;
 use super::error::{JobError, Source};
 use super::keys::{CUTTER, MACHINE, WOOD};
 use super::reader::Table;
-use super::types::{CutterShape, CutterSpec, Machine, Wood};
+use super::types::{CutterSpec, Machine, Wood};
 
 /// The machines, cutters and woods that jobs can name.
 #[derive(Debug, Clone, PartialEq)]
@@ -135,43 +136,6 @@ pub(super) fn read_machine(table: &Table<'_>, name: &str) -> Result<Machine, Job
         return Err(table.impossible("spindle_max_rpm", &message, "", "exchange the two"));
     }
     Ok(machine)
-}
-
-/// Reads a cutter from a checked table.
-pub(super) fn read_cutter(table: &Table<'_>, name: Option<&str>) -> Result<CutterSpec, JobError> {
-    let shape = [CutterShape::Flat, CutterShape::Ball][table.choice("shape")];
-    let diameter_mm = table.sure_number("diameter_mm");
-    let name = table.text("name").or(name).map_or_else(
-        || format!("{}-{diameter_mm}", super::keys::SHAPES[table.choice("shape")]),
-        str::to_owned,
-    );
-    let cutter = CutterSpec {
-        name,
-        shape,
-        diameter_mm,
-        flutes: table.sure_number("flutes") as u32,
-        flute_mm: table.sure_number("flute_mm"),
-        shank_mm: table.number("shank_mm").unwrap_or(diameter_mm),
-        stickout_mm: table.sure_number("stickout_mm"),
-        holder_mm: table.sure_number("holder_mm"),
-    };
-    if cutter.flute_mm > cutter.stickout_mm {
-        let message = format!(
-            "the flutes ({} mm) are longer than what sticks out of the collet ({} mm)",
-            cutter.flute_mm, cutter.stickout_mm
-        );
-        let help = "stickout_mm is measured from the tip to the collet";
-        return Err(table.impossible("stickout_mm", &message, "", help));
-    }
-    if cutter.shape == CutterShape::Ball && cutter.flute_mm < diameter_mm / 2.0 {
-        let message = format!(
-            "flutes of {} mm do not reach round a ball of {diameter_mm} mm",
-            cutter.flute_mm
-        );
-        let help = format!("flute_mm is measured from the tip: at least {}", diameter_mm / 2.0);
-        return Err(table.impossible("flute_mm", &message, "", &help));
-    }
-    Ok(cutter)
 }
 
 /// Reads a wood from a checked table.

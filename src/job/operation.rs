@@ -2,10 +2,11 @@
 
 use toml::de::{DeTable, DeValue};
 
+use super::cutter::read_cutter;
 use super::draft::{Draft, text_or_form};
 use super::error::{JobError, Source};
 use super::keys::{CUTTER, OPERATION, OPERATIONS, rule};
-use super::library::{Library, read_cutter};
+use super::library::Library;
 use super::reader::Table;
 use super::settle::round;
 use super::speeds::{self, Speeds, Wanted};
@@ -79,18 +80,20 @@ pub(super) fn read_operation(
         let message = "the distance of the passes is given twice: by stepover_mm and by scallop_mm";
         return Err(table.impossible("stepover_mm", message, "", "keep one of the two"));
     }
-    if kind == KindDraft::Finish && draft.cutter.shape == CutterShape::Flat {
-        let message = format!("a flat cutter ({}) cannot finish slopes", draft.cutter.name);
-        let help = "take a ball cutter, or kind = \"raster\" with stepover_mm";
+    let word = draft.cutter.shape.word();
+    if kind == KindDraft::Finish && draft.cutter.ball_mm().is_none() {
+        let message = format!("a {word} cutter ({}) cannot finish slopes", draft.cutter.name);
+        let help = "take a ball or tapered cutter, or kind = \"raster\" with stepover_mm";
         return Err(table.impossible("cutter", &message, "", help));
     }
-    if draft.scallop_mm.is_some() && draft.cutter.shape == CutterShape::Flat {
-        let message = format!("a flat cutter ({}) leaves no cusps", draft.cutter.name);
+    if draft.scallop_mm.is_some() && draft.cutter.ball_mm().is_none() {
+        let name = &draft.cutter.name;
+        let message = format!("a {word} cutter ({name}) leaves no cusps of a known height");
         return Err(table.impossible(
             "scallop_mm",
             &message,
             "",
-            "give stepover_mm, or take a ball cutter",
+            "give stepover_mm, or take a ball or tapered cutter",
         ));
     }
     Ok(draft)
@@ -270,7 +273,11 @@ impl Step<'_> {
             KindDraft::Rough => OperationKind::Rough {
                 leave_mm: draft.leave_mm,
                 stepdown_mm: self.stepdown_mm()?,
-                stepover_mm: draft.stepover_mm.unwrap_or(round(rule::ROUGH_STEPOVER * diameter)),
+                stepover_mm: match draft.stepover_mm {
+                    Some(stepover_mm) => stepover_mm,
+                    None if self.is_pointed() => return self.lacks_stepover(),
+                    None => round(rule::ROUGH_STEPOVER * draft.cutter.working_mm()),
+                },
                 angle_rad,
             },
             KindDraft::Finish => {
@@ -282,7 +289,7 @@ impl Step<'_> {
 
     fn stepdown_mm(&self) -> Result<f64, JobError> {
         let cutter = &self.draft.cutter;
-        let usual = round(self.stock.wood.stepdown_per_diameter * cutter.diameter_mm)
+        let usual = round(self.stock.wood.stepdown_per_diameter * cutter.working_mm())
             .max(rule::LEAST_STEPDOWN_MM);
         let stepdown_mm = self.draft.stepdown_mm.unwrap_or(usual.min(cutter.flute_mm));
         if stepdown_mm > cutter.flute_mm {
@@ -296,12 +303,31 @@ impl Step<'_> {
         Ok(stepdown_mm)
     }
 
+    /// True for cutters that leave ribs between passes which are a good part of their diameter apart.
+    fn is_pointed(&self) -> bool {
+        matches!(self.draft.cutter.shape, CutterShape::V { .. } | CutterShape::Table { .. })
+    }
+
+    fn lacks_stepover<T>(&self) -> Result<T, JobError> {
+        let cutter = &self.draft.cutter;
+        let message = format!(
+            "no rule gives the distance of the passes of {}, a {} cutter",
+            cutter.name,
+            cutter.shape.word()
+        );
+        let help = "give stepover_mm: little more than what is flat at the tip";
+        self.refuse(&["stepover_mm", "cutter"], &message, help)
+    }
+
     fn stepover(&self) -> Result<Stepover, JobError> {
         let cutter = &self.draft.cutter;
         if let Some(stepover_mm) = self.draft.stepover_mm {
             return Ok(Stepover::Plan(stepover_mm));
         }
-        if cutter.shape == CutterShape::Flat {
+        if self.is_pointed() {
+            return self.lacks_stepover();
+        }
+        if cutter.ball_mm().is_none() {
             return Ok(Stepover::Plan(round(rule::FLAT_STEPOVER * cutter.diameter_mm)));
         }
         Ok(Stepover::Scallop(self.scallop_mm()?))
@@ -309,8 +335,9 @@ impl Step<'_> {
 
     fn scallop_mm(&self) -> Result<f64, JobError> {
         let cutter = &self.draft.cutter;
+        let ball_mm = cutter.ball_mm().unwrap_or(cutter.diameter_mm);
         let scallop_mm = self.draft.scallop_mm.unwrap_or(self.job.tolerance.scallop_mm);
-        if scallop_mm >= cutter.diameter_mm / 2.0 {
+        if scallop_mm >= ball_mm / 2.0 {
             let message =
                 format!("cusps of {scallop_mm} mm are higher than the radius of {}", cutter.name);
             return self.refuse(&["scallop_mm", "cutter"], &message, "0.01 is usual");

@@ -375,6 +375,11 @@ impl<'a> Table<'a> {
         JobError::WrongType(self.source.fault(Some(span), &message, &label, &help))
     }
 
+    /// Refuses that a key is not given which these values need.
+    pub(super) fn lacks(&self, name: &str) -> JobError {
+        self.missing(self.section.key(name).expect("readers ask for keys of their own section"))
+    }
+
     fn missing(&self, key: &Key) -> JobError {
         let message = match self.path.as_str() {
             "" => format!("`{}` is missing", key.name),

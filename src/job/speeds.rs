@@ -1,7 +1,7 @@
 //! Feed, plunge and spindle speed from wood, cutter and machine.
 
 use super::keys::rule;
-use super::types::{CutterShape, CutterSpec, Machine, Wood};
+use super::types::{CutterSpec, Machine, Wood};
 
 /// What the job says, and what is to be found.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -22,14 +22,15 @@ pub(super) struct Speeds {
 /// Chip load of a cutter in a wood, mm/tooth: interpolated over the diameter; proportional to it
 /// below the smallest diameter of the table, constant above the largest.
 pub(super) fn chip_load_mm(wood: &Wood, cutter: &CutterSpec) -> f64 {
-    let table = match cutter.shape {
-        CutterShape::Flat => &wood.flat_chip_load_mm,
-        CutterShape::Ball => &wood.ball_chip_load_mm,
+    let diameter_mm = cutter.working_mm();
+    let table = match cutter.ball_mm() {
+        None => &wood.flat_chip_load_mm,
+        Some(_) => &wood.ball_chip_load_mm,
     };
     let mut last = (0.0, 0.0);
     for &(diameter, load) in table {
-        if cutter.diameter_mm <= diameter {
-            let part = (cutter.diameter_mm - last.0) / (diameter - last.0);
+        if diameter_mm <= diameter {
+            let part = (diameter_mm - last.0) / (diameter - last.0);
             return last.1 + part * (load - last.1);
         }
         last = (diameter, load);

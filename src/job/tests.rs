@@ -243,6 +243,51 @@ fn every_built_in_file_is_read() {
 }
 
 #[test]
+fn every_form_of_cutter_is_built_in() {
+    let library = Library::built_in();
+    let shape = |name: &str| library.cutter(name).expect(name).shape.clone();
+    assert_eq!(shape("bull-6"), CutterShape::Bull { corner_mm: 1.0 });
+    let angle_rad = 60_f64.to_radians();
+    assert_eq!(shape("v-60"), CutterShape::V { angle_rad, tip_mm: 0.0 });
+    let taper_rad = 5_f64.to_radians();
+    assert_eq!(shape("tapered-1"), CutterShape::Tapered { tip_mm: 1.0, taper_rad });
+    assert!(matches!(shape("facet-6"), CutterShape::Table { profile } if profile[1] == (1.2, 0.6)));
+}
+
+#[test]
+fn cutters_of_every_form_are_read_and_written_back() {
+    let forms = [
+        ("shape = \"bull\", corner_mm = 0.75", "bull", None),
+        ("shape = \"v\", angle_deg = 37.3, tip_mm = 0.2", "v", None),
+        ("shape = \"tapered\", tip_mm = 1.5, taper_deg = 7.1", "tapered", Some(1.5)),
+        ("shape = \"table\", profile = [[0, 0], [1, 0.5], [3, 4]]", "table", None),
+    ];
+    for (form, word, ball_mm) in forms {
+        let text = format!(
+            "[artwork]\nfile = \"a.svg\"\n[[operation]]\nkind = \"raster\"\nstepover_mm = 0.5\n\
+             cutter = {{ {form}, diameter_mm = 6, flute_mm = 20, stickout_mm = 40 }}\n"
+        );
+        let settled = |text: &str| job(text).unwrap();
+        let first = settled(&text);
+        let cutter = &first.operations[0].cutter;
+        assert_eq!((cutter.shape.word(), &*cutter.name), (word, &*format!("{word}-6")));
+        assert_eq!(cutter.ball_mm(), ball_mm);
+        let again = settled(&first.to_toml());
+        assert_eq!(again.operations, first.operations);
+    }
+}
+
+#[test]
+fn chips_of_a_tapered_cutter_are_those_of_its_tip() {
+    let library = Library::built_in();
+    let beech = library.wood("beech").unwrap();
+    let load = |name: &str| speeds::chip_load_mm(beech, library.cutter(name).unwrap());
+    assert_eq!(load("tapered-2"), load("ball-2"));
+    assert_eq!(load("tapered-1"), load("ball-1"));
+    assert_eq!(load("bull-6"), load("flat-6"));
+}
+
+#[test]
 fn chip_loads_lie_in_the_ranges_of_the_trade() {
     // mm/tooth: flat 6, ball 3.175, ball 6 of softwood, hardwood, MDF.
     let ranges = [

@@ -548,8 +548,26 @@ pub struct CutterSpec {
     pub holder_mm: f64,
 }
 
+impl CutterSpec {
+    /// Diameter of the round tip, mm: what the scallops of finishing passes are reckoned with; `None` where the tip is
+    /// not a ball.
+    pub fn ball_mm(&self) -> Option<f64> {
+        match self.shape {
+            CutterShape::Ball => Some(self.diameter_mm),
+            CutterShape::Tapered { tip_mm, .. } => Some(tip_mm),
+            _ => None,
+        }
+    }
+
+    /// The diameter that bears the load, mm: a tapered cutter breaks at its tip, others are as strong as they are wide.
+    /// Rules in parts of a diameter (depth of a pass, chip load) mean this one.
+    pub fn working_mm(&self) -> f64 {
+        self.ball_mm().unwrap_or(self.diameter_mm)
+    }
+}
+
 /// Form of the cutting end.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum CutterShape {
@@ -557,4 +575,60 @@ pub enum CutterShape {
     Flat,
     /// Ball-nose end mill: half a sphere of the cutting diameter.
     Ball,
+    /// Bull-nose end mill: flat with a rounded corner.
+    Bull {
+        /// Radius of the corner, mm; at most half the cutting diameter.
+        corner_mm: f64,
+    },
+    /// V cutter: a cone.
+    V {
+        /// Angle of the whole cone, radians.
+        angle_rad: f64,
+        /// Diameter of the flat at the tip, mm; 0 = pointed.
+        tip_mm: f64,
+    },
+    /// Tapered ball nose: a ball that goes over into a cone without a step.
+    Tapered {
+        /// Diameter of the ball, mm.
+        tip_mm: f64,
+        /// Angle between the axis and the side of the cone, radians.
+        taper_rad: f64,
+    },
+    /// Any convex form, as straight pieces.
+    Table {
+        /// (radius, height above the tip), mm, the tip first: radii rise, the slope never falls.
+        profile: Vec<(f64, f64)>,
+    },
+}
+
+impl CutterShape {
+    /// The word for it in files.
+    pub fn word(&self) -> &'static str {
+        match self {
+            Self::Flat => "flat",
+            Self::Ball => "ball",
+            Self::Bull { .. } => "bull",
+            Self::V { .. } => "v",
+            Self::Tapered { .. } => "tapered",
+            Self::Table { .. } => "table",
+        }
+    }
+
+    /// Height above the tip at which the cutting end has its full diameter, mm.
+    pub fn height_mm(&self, diameter_mm: f64) -> f64 {
+        let radius_mm = diameter_mm / 2.0;
+        match *self {
+            Self::Flat => 0.0,
+            Self::Ball => radius_mm,
+            Self::Bull { corner_mm } => corner_mm,
+            Self::V { angle_rad, tip_mm } => {
+                (radius_mm - tip_mm / 2.0) / libm::tan(angle_rad / 2.0)
+            }
+            // The side of the cone, produced, meets the axis 1/sin - 1 radii below the ball's lowest point.
+            Self::Tapered { tip_mm, taper_rad } => {
+                radius_mm / libm::tan(taper_rad) - tip_mm / 2.0 * (1.0 / libm::sin(taper_rad) - 1.0)
+            }
+            Self::Table { ref profile } => profile.last().map_or(0.0, |&(_, height_mm)| height_mm),
+        }
+    }
 }

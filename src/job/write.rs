@@ -6,13 +6,13 @@ use super::draft::Draft;
 use super::error::JobError;
 use super::keys::{
     ARTWORK, BACKGROUND, COMBINES, CUTTER, Fallback, JOB, JOINS, LAYER, MACHINE, OPERATION,
-    ORIGINS, PROFILES, PRUNES, RELIEF, SAFETY, SHAPES, SPLITS, STOCK, SURFACE, Section, TOLERANCE,
-    TOP, WOOD, rule,
+    ORIGINS, PROFILES, PRUNES, RELIEF, SAFETY, SPLITS, STOCK, SURFACE, Section, TOLERANCE, TOP,
+    WOOD, rule,
 };
 use super::library::Library;
 use super::types::{
-    Background, CutterSpec, Fit, Found, Job, LayerSpec, Machine, Operation, OperationKind, Place,
-    Prune, SkeletonSpec, Stepover, SurfaceSpec, Wood,
+    Background, CutterShape, CutterSpec, Fit, Found, Job, LayerSpec, Machine, Operation,
+    OperationKind, Place, Prune, SkeletonSpec, Stepover, SurfaceSpec, Wood,
 };
 use crate::geom::{DVec2, DVec3};
 
@@ -214,11 +214,6 @@ fn stock_lines(job: &Job) -> Vec<Line> {
 }
 
 fn wood_lines(wood: &Wood) -> Vec<Line> {
-    let pairs = |pairs: &[(f64, f64)]| {
-        let items: Vec<String> =
-            pairs.iter().map(|(a, b)| format!("[{}, {}]", number(*a), number(*b))).collect();
-        format!("[{}]", items.join(", "))
-    };
     vec![
         ("name", quoted(&wood.name)),
         ("title", quoted(&wood.title)),
@@ -379,16 +374,38 @@ fn operation_lines(operation: &Operation) -> Vec<Line> {
 }
 
 fn cutter_lines(cutter: &CutterSpec) -> Vec<Line> {
-    vec![
+    let mut lines = vec![
         ("name", quoted(&cutter.name)),
-        ("shape", quoted(SHAPES[cutter.shape as usize])),
+        ("shape", quoted(cutter.shape.word())),
         ("diameter_mm", number(cutter.diameter_mm)),
+    ];
+    match cutter.shape {
+        CutterShape::Flat | CutterShape::Ball => {}
+        CutterShape::Bull { corner_mm } => lines.push(("corner_mm", number(corner_mm))),
+        CutterShape::V { angle_rad, tip_mm } => {
+            lines.push(("angle_deg", degrees(angle_rad)));
+            lines.push(("tip_mm", number(tip_mm)));
+        }
+        CutterShape::Tapered { tip_mm, taper_rad } => {
+            lines.push(("tip_mm", number(tip_mm)));
+            lines.push(("taper_deg", degrees(taper_rad)));
+        }
+        CutterShape::Table { ref profile } => lines.push(("profile", pairs(profile))),
+    }
+    lines.extend([
         ("flutes", cutter.flutes.to_string()),
         ("flute_mm", number(cutter.flute_mm)),
         ("shank_mm", number(cutter.shank_mm)),
         ("stickout_mm", number(cutter.stickout_mm)),
         ("holder_mm", number(cutter.holder_mm)),
-    ]
+    ]);
+    lines
+}
+
+fn pairs(pairs: &[(f64, f64)]) -> String {
+    let pairs: Vec<String> =
+        pairs.iter().map(|(a, b)| format!("[{}, {}]", number(*a), number(*b))).collect();
+    format!("[{}]", pairs.join(", "))
 }
 
 fn inline(lines: &[Line]) -> String {

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::contact::TOUCH_MM;
-use crate::cutter::Profile;
+use crate::cutter::{Profile, Turned};
 use crate::geom::{DVec2, Heightfield};
 
 /// Cells along the side of a leaf, leaves along the side of the next block, and so on.
@@ -50,6 +50,9 @@ impl Fan {
     /// Surface minus profile is concave where the surface is a plane, so it lies below its tangent at the
     /// middle of the block; and no contact is higher than the highest node over the nearest point.
     pub(super) fn bounds(&self, profile: &Profile, corner: DVec2, side_mm: f64) -> [f32; LANES] {
+        if let Profile::Turned(form) = profile {
+            return self.bounds_of(form, corner, side_mm);
+        }
         let r = profile.radius_mm() as f32;
         let (x, y, side) = (corner.x as f32, corner.y as f32, side_mm as f32);
         let half = 0.5 * side * (1.0 + ROUND_OFF);
@@ -85,6 +88,21 @@ impl Fan {
             };
             let reached = near2 <= beyond * beyond * (1.0 + ROUND_OFF);
             *out = if reached { bound } else { f32::NEG_INFINITY };
+        }
+        bounds
+    }
+
+    /// [`Fan::bounds`] for any convex form: the highest node over the nearest point.
+    fn bounds_of(&self, form: &Turned, corner: DVec2, side_mm: f64) -> [f32; LANES] {
+        let half = 0.5 * side_mm;
+        let mut bounds = [f32::NEG_INFINITY; LANES];
+        for (lane, out) in bounds.iter_mut().enumerate() {
+            let cell = DVec2::new((lane % FAN) as f64 + 0.5, (lane / FAN) as f64 + 0.5);
+            let near = ((corner + cell * side_mm).abs() - half).max(DVec2::ZERO).length();
+            if self.top[lane] > f32::NEG_INFINITY && near <= form.radius_mm() + TOUCH_MM {
+                let rise = form.height((near - TOUCH_MM).max(0.0)) as f32;
+                *out = self.top[lane] - rise + ROUND_OFF * (self.top[lane].abs() + rise);
+            }
         }
         bounds
     }

@@ -45,6 +45,13 @@ impl Cell {
         let mut best = f64::NEG_INFINITY;
         for (slope, is_lower) in [(lower, true), (upper, false)] {
             let (contact, tip) = match *profile {
+                Profile::Turned(ref form) => {
+                    let steepness = slope.length();
+                    let r = form.touch(steepness);
+                    let contact =
+                        if steepness > 0.0 { slope * (r / steepness) } else { DVec2::ZERO };
+                    (contact, steepness * r - form.height(r))
+                }
                 Profile::Ball { radius_mm } => {
                     let stretch = (1.0 + slope.length_squared()).sqrt();
                     (slope * (radius_mm / stretch), radius_mm * (stretch - 1.0))
@@ -82,6 +89,10 @@ pub(super) fn edge(profile: &Profile, a: DVec2, za: f64, b: DVec2, zb: f64) -> f
     let w_squared = (radius * radius - across * across).max(0.0);
     let w = w_squared.sqrt();
     let free = match *profile {
+        Profile::Turned(ref form) => {
+            let reach = form.touch_along(across.abs().min(radius), slope.abs());
+            foot + if slope < 0.0 { -reach } else { reach }
+        }
         Profile::Ball { .. } => foot + slope * w / (1.0 + slope * slope).sqrt(),
         Profile::Flat { .. } => foot + if slope < 0.0 { -w } else { w },
     };
@@ -92,6 +103,7 @@ pub(super) fn edge(profile: &Profile, a: DVec2, za: f64, b: DVec2, zb: f64) -> f
     }
     let z = za + slope * s;
     match *profile {
+        Profile::Turned(ref form) => z - form.height((across * across + off * off).sqrt()),
         Profile::Ball { .. } => z - radius + (w_squared - off * off).max(0.0).sqrt(),
         Profile::Flat { .. } => z,
     }

@@ -21,6 +21,9 @@ const FEW: usize = 2;
 /// Nodes of a row that are looked at together in `f32`; a leaf has fewer.
 const GLANCE: usize = 8;
 
+/// Relative rounding of heights in `f32`.
+const KNOWN_SLACK: f64 = 2.5e-7;
+
 /// A ball is looked at cell by cell where its half chord is below this part of its radius.
 const STEEP_CHORD: f64 = 0.35;
 
@@ -39,7 +42,7 @@ type Block = (usize, usize);
 struct Search<'d> {
     surface: &'d Heightfield,
     levels: &'d [Level],
-    profile: Profile,
+    profile: &'d Profile,
     radius_mm: f64,
     p: DVec2,
     /// Highest exact contact so far.
@@ -63,13 +66,14 @@ impl<'a> Dropper<'a> {
     /// The lowest height of the tip at `p` at which the cutter touches but does not enter the surface,
     /// mm; [`f64::NEG_INFINITY`] where the cutter overlaps nothing. Exact to round-off.
     pub fn drop(&self, p: DVec2) -> f64 {
-        self.search(self.profile, p, None).0
+        self.search(&self.profile, p, None, f64::NEG_INFINITY).0
     }
 
     /// The highest point of the surface under the closed disc of the cutter at `p`, mm;
     /// [`f64::NEG_INFINITY`] where it overlaps nothing.
     pub fn highest_under(&self, p: DVec2) -> f64 {
-        self.search(Profile::Flat { radius_mm: self.profile.radius_mm() }, p, None).0
+        let disc = Profile::Flat { radius_mm: self.profile.radius_mm() };
+        self.search(&disc, p, None, f64::NEG_INFINITY).0
     }
 
     /// Drops at even distances of at most `step_mm` on the straight line from `a` to `b`, both ends
@@ -81,14 +85,29 @@ impl<'a> Dropper<'a> {
         let mut near = None;
         for k in 0..=steps {
             let t = k as f64 / steps as f64;
-            let (tip, leaf) = self.search(self.profile, a + (b - a) * t, near);
+            let p = a + (b - a) * t;
+            let (tip, leaf) = self.search(&self.profile, p, near, f64::NEG_INFINITY);
             near = (tip > f64::NEG_INFINITY).then_some(leaf);
             out.push((t * length, tip));
         }
     }
 
-    /// The tip and the leaf of the contact; `near` is a leaf that may lie close to it.
-    fn search(&self, profile: Profile, p: DVec2, near: Option<Block>) -> (f64, Block) {
+    /// Raises the heights `tip` of a row of nodes, which are known to be reached, to the exact drops.
+    pub(super) fn raise_row(&self, row: usize, tip: &mut [f32]) {
+        let mut near = None;
+        for (i, tip) in tip.iter_mut().enumerate() {
+            // Single precision may have rounded it up.
+            let known = f64::from(*tip) - KNOWN_SLACK * f64::from(tip.abs());
+            let p = self.surface.grid().node(i, row);
+            let (exact, leaf) = self.search(&self.profile, p, near, known);
+            near = (exact > f64::NEG_INFINITY).then_some(leaf);
+            *tip = tip.max(exact as f32) + 0.0;
+        }
+    }
+
+    /// The tip and the leaf of the contact; `near` is a leaf that may lie close to it. Contacts below `known` need not be
+    /// found.
+    fn search(&self, profile: &Profile, p: DVec2, near: Option<Block>, known: f64) -> (f64, Block) {
         let mut search = Search {
             surface: self.surface,
             levels: &self.levels,
@@ -96,7 +115,7 @@ impl<'a> Dropper<'a> {
             radius_mm: profile.radius_mm(),
             p,
             best: f64::NEG_INFINITY,
-            floor: f64::NEG_INFINITY,
+            floor: known,
             best_leaf: (0, 0),
             waiting: [(0.0, (0, 0)); WAITING],
             waiting_len: 0,
@@ -127,7 +146,12 @@ impl Search<'_> {
             self.scout((x, y));
             let fan = &level.fans[y / FAN * level.nx + x / FAN];
             let slope = fan.slope(y % FAN * FAN + x % FAN);
-            let one = if matches!(self.profile, Profile::Ball { .. }) { 1.0 } else { 1e-9 };
+            if let Profile::Turned(form) = self.profile {
+                let steepness = slope.length();
+                at = self.p + slope * (form.touch(steepness) / steepness.max(1e-9));
+                continue;
+            }
+            let one = if self.is_ball() { 1.0 } else { 1e-9 };
             at = self.p + slope * (self.radius_mm / (one + slope.length_squared()).sqrt());
         }
     }
@@ -169,7 +193,7 @@ impl Search<'_> {
         let side_mm = level.cells as f64 * grid.pitch_mm;
         let corner =
             DVec2::new((fx * FAN) as f64, (fy * FAN) as f64) * side_mm + (grid.origin - self.p);
-        let bounds = level.fans[fy * level.nx + fx].bounds(&self.profile, corner, side_mm);
+        let bounds = level.fans[fy * level.nx + fx].bounds(self.profile, corner, side_mm);
         let (mut open, mut count) = ([(0.0, 0); LANES + 1], 0);
         for (lane, &bound) in bounds.iter().enumerate() {
             open[count] = (f64::from(bound), lane);
@@ -213,7 +237,8 @@ impl Search<'_> {
         if distance_squared > beyond * beyond {
             return f64::NEG_INFINITY;
         }
-        match self.profile {
+        match *self.profile {
+            Profile::Turned(ref form) => z - form.height(distance_squared.sqrt()),
             Profile::Ball { radius_mm: r } => z - r + (r * r - distance_squared).max(0.0).sqrt(),
             Profile::Flat { .. } => z,
         }
@@ -223,6 +248,8 @@ impl Search<'_> {
     fn scout(&mut self, leaf: Block) {
         if self.is_ball() && self.grid().nx >= GLANCE {
             self.glance(leaf);
+        } else if let Profile::Turned(_) = self.profile {
+            self.vertices_of(leaf);
         } else {
             self.vertices(leaf);
         }
@@ -291,6 +318,21 @@ impl Search<'_> {
         tips
     }
 
+    /// [`Search::vertices`] of any convex form; only the best counts.
+    fn vertices_of(&mut self, (x, y): Block) {
+        let grid = *self.grid();
+        let mut best = f64::NEG_INFINITY;
+        for j in y * FAN..=(y * FAN + FAN).min(grid.ny - 1) {
+            for i in x * FAN..=(x * FAN + FAN).min(grid.nx - 1) {
+                let z = f64::from(self.surface.at(i, j));
+                if z > self.floor {
+                    best = best.max(self.tip_below(z, grid.node(i, j).distance_squared(self.p)));
+                }
+            }
+        }
+        self.raise(best, (x, y));
+    }
+
     fn is_ball(&self) -> bool {
         matches!(self.profile, Profile::Ball { .. })
     }
@@ -298,7 +340,12 @@ impl Search<'_> {
     /// Looks at a leaf whose contacts lie no higher than `bound`.
     fn leaf(&mut self, leaf: Block, bound: f64) {
         if !self.is_ball() {
-            self.vertices(leaf);
+            match self.profile {
+                Profile::Turned(_) => self.vertices_of(leaf),
+                _ => {
+                    self.vertices(leaf);
+                }
+            }
             self.cells(leaf);
             return;
         }
@@ -371,7 +418,7 @@ impl Search<'_> {
                 let cell = self.cell(i, j);
                 let top = cell.z.into_iter().fold(f64::NEG_INFINITY, f64::max);
                 if top > self.floor && self.tip_below(top, self.nearest((i, j), 1)) > self.floor {
-                    self.raise(cell.touch(&self.profile), (x, y));
+                    self.raise(cell.touch(self.profile), (x, y));
                 }
             }
         }
@@ -398,7 +445,7 @@ impl Search<'_> {
         while cells != 0 {
             let (di, dj) = node(cells.trailing_zeros());
             cells &= cells - 1;
-            let tip = self.cell(x * FAN + di, y * FAN + dj).touch_facets(&self.profile);
+            let tip = self.cell(x * FAN + di, y * FAN + dj).touch_facets(self.profile);
             self.raise(tip, (x, y));
         }
         for (a, b) in [(1, 0), (0, 1), (1, 1)] {
@@ -422,6 +469,6 @@ impl Search<'_> {
     fn edge(&self, a: (usize, usize), b: (usize, usize)) -> f64 {
         let node = |(i, j): (usize, usize)| self.grid().node(i, j) - self.p;
         let z = |(i, j): (usize, usize)| f64::from(self.surface.at(i, j));
-        edge(&self.profile, node(a), z(a), node(b), z(b))
+        edge(self.profile, node(a), z(a), node(b), z(b))
     }
 }

@@ -20,8 +20,8 @@ pub fn reach(job: &Job, target: &Heightfield) -> Heightfield {
         if done.contains(&profile) {
             continue;
         }
-        done.push(profile);
         let closed = closing(&tip_field(target, &profile), &profile);
+        done.push(profile);
         match &mut lowest {
             None => lowest = Some(closed),
             Some(lowest) => {

@@ -4,6 +4,7 @@ use super::field::{nodes_only, tip_field_on};
 use super::simd::Path;
 use super::*;
 use crate::cutter::Profile;
+use crate::cutter::tests::convex_forms;
 use crate::geom::{DVec2, DVec3, Grid, Heightfield};
 use proptest::prelude::*;
 
@@ -45,6 +46,17 @@ fn oracle_facet(profile: &Profile, t: [DVec3; 3], p: DVec2) -> f64 {
     let contact = match profile {
         Profile::Ball { .. } => p - n.truncate() * r,
         Profile::Flat { .. } => p - n.truncate().normalize_or_zero() * r,
+        Profile::Turned(_) => {
+            // Uphill from the axis, where the plane stands highest above the profile.
+            let slope = n.truncate().length() / n.z;
+            let lift = |r: f64| slope * r - profile.height_at(r).unwrap();
+            let (mut lo, mut hi) = (0.0, r);
+            for _ in 0..100 {
+                let (u, v) = (lo + (hi - lo) / 3.0, hi - (hi - lo) / 3.0);
+                if lift(u) < lift(v) { lo = u } else { hi = v }
+            }
+            p - n.truncate().normalize_or_zero() * lo
+        }
     };
     let turn = |u: DVec3, v: DVec3| (v - u).truncate().perp_dot(contact - u.truncate());
     let turns = [turn(t[0], t[1]), turn(t[1], t[2]), turn(t[2], t[0])];
@@ -163,11 +175,11 @@ fn cutters(pitch_mm: f64) -> Vec<Profile> {
 }
 
 /// Drops at some points against the plain drop cutter.
-fn compare_drops(name: &str, surface: &Heightfield, profile: Profile, count: usize) {
-    let dropper = Dropper::new(surface, profile);
+fn compare_drops(name: &str, surface: &Heightfield, profile: &Profile, count: usize) {
+    let dropper = Dropper::new(surface, profile.clone());
     let same = |got: f64, want: f64| got == want || (got - want).abs() < 1e-6;
     for p in points(surface, profile.radius_mm(), count) {
-        let (got, want) = (dropper.drop(p), oracle(surface, &profile, p));
+        let (got, want) = (dropper.drop(p), oracle(surface, profile, p));
         assert!(same(got, want), "{name}, {profile:?} at {p}: {got}, plain {want}");
         if matches!(profile, Profile::Flat { .. }) {
             let ball = Profile::Ball { radius_mm: profile.radius_mm() };
@@ -181,7 +193,74 @@ fn compare_drops(name: &str, surface: &Heightfield, profile: Profile, count: usi
 fn drops_agree_with_the_plain_drop_cutter() {
     for (name, surface) in surfaces(30, 0.1) {
         for profile in cutters(0.1) {
-            compare_drops(name, &surface, profile, 6);
+            compare_drops(name, &surface, &profile, 6);
+        }
+    }
+}
+
+#[test]
+fn drops_of_convex_forms_agree_with_the_plain_drop_cutter() {
+    for (name, surface) in surfaces(30, 0.1) {
+        for profile in convex_forms() {
+            compare_drops(name, &surface, &profile, 1);
+        }
+    }
+}
+
+/// The plainest law of all: no sampled point of the surface lies inside the cutter, and one of them, within what lies
+/// between samples, holds it up.
+#[test]
+fn convex_forms_rest_on_the_surface_and_enter_it_nowhere() {
+    for (name, surface) in surfaces(20, 0.1) {
+        for profile in convex_forms() {
+            let dropper = Dropper::new(&surface, profile.clone());
+            for p in points(&surface, 0.0, 3) {
+                let tip = dropper.drop(p);
+                let highest = sampled(&surface, &profile, p, 12);
+                assert!(tip >= highest - 1e-9, "{name}, {profile:?} at {p}: {tip}, {highest}");
+                // Samples lie a twelfth of a pitch apart in plan: the steepest facet (8 mm in 0.1) and the steepest flank (a
+                // bull's or ball's is left out here) rise so much between two of them.
+                let between = 0.1 / 12.0 * (80.0 * 1.5 + 8.0);
+                assert!(tip <= highest + between, "{name}, {profile:?} at {p}: {tip}, {highest}");
+            }
+        }
+    }
+}
+
+/// Highest tip over sampled points of all facets, so many to a side.
+fn sampled(surface: &Heightfield, profile: &Profile, p: DVec2, parts: u32) -> f64 {
+    let (grid, mut highest) = (surface.grid(), f64::NEG_INFINITY);
+    let node = |i: usize, j: usize| grid.node(i, j).extend(f64::from(surface.at(i, j)));
+    for j in 0..grid.ny - 1 {
+        for i in 0..grid.nx - 1 {
+            let (a, b, c, d) = (node(i, j), node(i + 1, j), node(i + 1, j + 1), node(i, j + 1));
+            for [a, b, c] in [[a, b, c], [a, c, d]] {
+                for k in 0..=parts {
+                    for l in 0..=parts - k {
+                        let part = |k: u32| f64::from(k) / f64::from(parts);
+                        let q = a + (b - a) * part(k) + (c - a) * part(l);
+                        if let Some(rise) = profile.height_at(q.truncate().distance(p)) {
+                            highest = highest.max(q.z - rise);
+                        }
+                    }
+                }
+            }
+        }
+    }
+    highest
+}
+
+#[test]
+fn the_tip_field_of_convex_forms_is_what_the_plain_drop_cutter_says() {
+    for (name, surface) in surfaces(10, 0.3) {
+        for profile in convex_forms() {
+            let tip = tip_field(&surface, &profile);
+            let grid = surface.grid();
+            for n in 0..grid.len() {
+                let want = oracle(&surface, &profile, grid.node(n % grid.nx, n / grid.nx));
+                let got = f64::from(tip.z()[n]);
+                assert!((got - want).abs() < 1e-6, "{name}, {profile:?}, node {n}: {got} {want}");
+            }
         }
     }
 }
@@ -190,7 +269,7 @@ fn drops_agree_with_the_plain_drop_cutter() {
 fn drops_agree_with_the_plain_drop_cutter_on_fields_of_many_blocks() {
     for (name, surface) in surfaces(300, 0.1) {
         for profile in [BALL_3, FLAT_3] {
-            compare_drops(name, &surface, profile, 3);
+            compare_drops(name, &surface, &profile, 3);
         }
     }
 }
@@ -200,7 +279,7 @@ fn the_tip_field_is_the_exact_drop_at_every_node() {
     for (name, surface) in surfaces(48, 0.1) {
         for profile in cutters(0.1) {
             let tip = tip_field(&surface, &profile);
-            let dropper = Dropper::new(&surface, profile);
+            let dropper = Dropper::new(&surface, profile.clone());
             let grid = surface.grid();
             for j in 0..grid.ny {
                 for i in 0..grid.nx {
@@ -220,7 +299,7 @@ fn one_and_two_threads_and_every_instruction_set_give_the_same_bits() {
     let bits = |field: &[f32]| field.iter().map(|z| z.to_bits()).collect::<Vec<_>>();
     // More rows than a task of the fold takes.
     for (name, surface) in surfaces(180, 0.1) {
-        for profile in [BALL_3, FLAT_3] {
+        for profile in [BALL_3, FLAT_3, convex_forms().swap_remove(7)] {
             let on = |threads: usize, path: Path| {
                 let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
                 pool.install(|| bits(tip_field_on(path, &surface, &profile).z()))
@@ -236,7 +315,10 @@ fn one_and_two_threads_and_every_instruction_set_give_the_same_bits() {
 #[test]
 fn dilation_and_closing_are_their_definitions() {
     for (name, surface) in surfaces(50, 0.1) {
-        for profile in [Profile::Ball { radius_mm: 0.73 }, Profile::Flat { radius_mm: 0.73 }] {
+        let plain = [Profile::Ball { radius_mm: 0.73 }, Profile::Flat { radius_mm: 0.73 }];
+        // No node lies on a rim.
+        let convex = convex_forms().into_iter().step_by(5).map(|profile| profile.slimmed(0.017));
+        for profile in plain.into_iter().chain(convex) {
             let grid = surface.grid();
             let node = |n: usize| grid.node(n % grid.nx, n / grid.nx);
             let fields: Vec<_> =
@@ -269,7 +351,7 @@ fn the_tip_rides_higher_on_a_slope_by_the_analytic_amount() {
                 [(BALL_3, 1.5 * ((1.0 + slope * slope).sqrt() - 1.0)), (FLAT_3, 1.5 * slope)]
             {
                 let tip = tip_field(&plane, &profile);
-                let dropper = Dropper::new(&plane, profile);
+                let dropper = Dropper::new(&plane, profile.clone());
                 // Heights of a few hundred mm are stored to 15 nm each; the field is that bumpy.
                 let slack = 1e-6 + 2e-7 * slope * 15.0;
                 let p = plane.grid().bounds().center() + DVec2::new(0.013, -0.041);
@@ -285,7 +367,7 @@ fn the_tip_rides_higher_on_a_slope_by_the_analytic_amount() {
 #[test]
 fn a_line_of_drops_is_the_drops() {
     for (_, surface) in surfaces(60, 0.1) {
-        for profile in [BALL_3, FLAT_3] {
+        for profile in [BALL_3, FLAT_3].into_iter().chain(convex_forms().into_iter().step_by(5)) {
             let dropper = Dropper::new(&surface, profile);
             let (a, b) = (surface.grid().bounds().grown(3.0).min, surface.grid().bounds().max);
             let mut line = vec![(-1.0, 0.0)];
@@ -328,8 +410,21 @@ proptest! {
             if is_ball { Profile::Ball { radius_mm } } else { Profile::Flat { radius_mm } };
         let b = surface.grid().bounds();
         let p = b.min + b.size() * DVec2::new(x, y);
-        let (got, want) = (Dropper::new(&surface, profile).drop(p), oracle(&surface, &profile, p));
+        let (got, want) = (Dropper::new(&surface, profile.clone()).drop(p), oracle(&surface, &profile, p));
         prop_assert!(got == want || (got - want).abs() < 1e-6, "{} {}", got, want);
+    }
+
+    #[test]
+    fn drops_of_convex_forms_agree_anywhere(
+        z in proptest::collection::vec(-3.0f32..3.0, 11 * 9),
+        pitch_mm in 0.05f64..4.0, which in 0usize..12, x in -0.5f64..1.5, y in -0.5f64..1.5,
+    ) {
+        let surface = Heightfield::from_z(grid(11, 9, pitch_mm), z);
+        let profile = convex_forms().swap_remove(which);
+        let b = surface.grid().bounds();
+        let p = b.min + b.size() * DVec2::new(x, y);
+        let (got, want) = (Dropper::new(&surface, profile.clone()).drop(p), oracle(&surface, &profile, p));
+        prop_assert!(got == want || (got - want).abs() < 1e-6, "{profile:?}: {got} {want}");
     }
 
     #[test]

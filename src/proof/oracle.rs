@@ -79,15 +79,15 @@ fn visit(cutter: &CutterSpec, m: &Move, sorted: &[DVec2], mut f: impl FnMut(usiz
         if p.y < lo.y || p.y > hi.y {
             continue;
         }
-        if let Some(low) = tip_over(cutter.shape, r, m, *p) {
-            let high = tip_over(cutter.shape, r - 2.0 * RIM_MM, m, *p).unwrap_or(f64::INFINITY);
+        if let Some(low) = tip_over(&cutter.shape, r, m, *p) {
+            let high = tip_over(&cutter.shape, r - 2.0 * RIM_MM, m, *p).unwrap_or(f64::INFINITY);
             f(k, low, high);
         }
     }
 }
 
 /// Lowest height of the cutting end of radius `r` over `p` along the move; `None` where it does not come.
-fn tip_over(shape: CutterShape, r: f64, m: &Move, p: DVec2) -> Option<f64> {
+fn tip_over(shape: &CutterShape, r: f64, m: &Move, p: DVec2) -> Option<f64> {
     let (d, a) = (m.to - m.from, m.from.truncate() - p);
     // |a + t d|^2 <= r^2 for t between the roots.
     let (qa, qb, qc) =
@@ -116,9 +116,10 @@ fn tip_over(shape: CutterShape, r: f64, m: &Move, p: DVec2) -> Option<f64> {
                 let off = a + d.truncate() * t;
                 tip + r - f64::max(r * r - off.x * off.x - off.y * off.y, 0.0).sqrt()
             }
+            _ => tip + rise(shape, r, (a + d.truncate() * t).length()),
         }
     };
-    if shape == CutterShape::Ball {
+    if *shape != CutterShape::Flat {
         while t1 - t0 > 1e-9 {
             let third = (t1 - t0) / 3.0;
             if z(t0 + third) < z(t1 - third) {
@@ -129,6 +130,35 @@ fn tip_over(shape: CutterShape, r: f64, m: &Move, p: DVec2) -> Option<f64> {
         }
     }
     Some(f64::min(z(t0), z(t1)))
+}
+
+/// Height above the tip of a cutting end of radius `r`, `off` from its axis. Cones go on at the rim.
+fn rise(shape: &CutterShape, r: f64, off: f64) -> f64 {
+    match *shape {
+        CutterShape::Flat => 0.0,
+        CutterShape::Ball => r - f64::max(r * r - off * off, 0.0).sqrt(),
+        CutterShape::Bull { corner_mm } => {
+            let out = f64::max(off - (r - corner_mm), 0.0);
+            corner_mm - f64::max(corner_mm * corner_mm - out * out, 0.0).sqrt()
+        }
+        CutterShape::V { angle_rad, tip_mm } => {
+            f64::max(off - tip_mm / 2.0, 0.0) / libm::tan(angle_rad / 2.0)
+        }
+        CutterShape::Tapered { tip_mm, taper_rad } => {
+            let ball = tip_mm / 2.0;
+            let (tangent, low) = (ball * libm::cos(taper_rad), ball - ball * libm::sin(taper_rad));
+            if off <= tangent {
+                ball - (ball * ball - off * off).sqrt()
+            } else {
+                low + (off - tangent) / libm::tan(taper_rad)
+            }
+        }
+        // Of a convex profile the highest of all its lines counts.
+        CutterShape::Table { ref profile } => profile
+            .windows(2)
+            .map(|p| p[0].1 + (off - p[0].0) * (p[1].1 - p[0].1) / (p[1].0 - p[0].0))
+            .fold(0.0, f64::max),
+    }
 }
 
 /// Pseudo-random numbers, the same in every run (SplitMix64, Steele, Lea and Flood 2014).

@@ -1,3 +1,5 @@
+mod forms;
+
 use super::*;
 use crate::cutter::Profile;
 use crate::gcode::read;
@@ -496,9 +498,18 @@ proptest! {
     #[test]
     fn both_oracles_agree_everywhere(
         points in prop::collection::vec((-2.0f64..14.0, -2.0f64..12.0, -3.0f64..1.0), 2..12),
-        ball: bool,
+        which in 0usize..10,
     ) {
-        let shape = if ball { CutterShape::Ball } else { CutterShape::Flat };
+        let shape = match which {
+            0..2 => CutterShape::Ball,
+            2..4 => CutterShape::Flat,
+            4 => CutterShape::Bull { corner_mm: 0.4 },
+            5 => CutterShape::V { angle_rad: 1.0, tip_mm: 0.0 },
+            6 => CutterShape::V { angle_rad: 1.5, tip_mm: 0.7 },
+            7 => CutterShape::Tapered { tip_mm: 1.0, taper_rad: 0.1 },
+            8 => CutterShape::Tapered { tip_mm: 2.0, taper_rad: 0.9 },
+            _ => CutterShape::Table { profile: vec![(0.2, 0.0), (0.9, 0.3), (1.5, 2.0)] },
+        };
         let spec = cutter(shape, 3.0);
         let kind = MoveKind::Feed { feed_mm_per_min: 900.0 };
         let moves: Vec<Move> = points.windows(2).map(|w| {

@@ -2,9 +2,11 @@
 //!
 //! Where the target rises by more than a cell within a cell, a cutter can enter the wall by less than half a pitch
 //! without covering a node or a point halfway between two. So here each move is held against the triangles
-//! themselves: the ball by its exact distance from them, the flat by the part of them above its tip.
+//! themselves: the ball by its exact distance from them, the flat by the part of them above its tip, any other convex
+//! form by the deepest point of their edges and of some lines across them.
 
 use super::oracle::Track;
+use crate::cutter::{Profile, Turned};
 use crate::geom::{DVec2, DVec3, Heightfield, Move};
 use crate::job::CutterShape;
 use rayon::prelude::*;
@@ -17,6 +19,9 @@ const STEEP_PITCHES: f64 = 2.0;
 
 /// Moves that one task looks at.
 const CHUNK: usize = 64;
+
+/// Steps of the search for the deepest point of an edge; each leaves two thirds of it.
+const THIRDS: usize = 24;
 
 /// Penetration beyond the tolerance by less than this is round-off of the stored heights, mm.
 const ROUND_OFF_MM: f64 = 1e-5;
@@ -121,13 +126,21 @@ impl<'a> Walls<'a> {
         if m.from.z.min(m.to.z) >= self.top_mm {
             return None;
         }
-        let r = track.cutter.diameter_mm * 0.5;
+        let profile = Profile::of(track.cutter);
+        let r = profile.radius_mm();
         let pitch = self.field.grid().pitch_mm;
         let limit_mm = gouge_mm + ROUND_OFF_MM;
         let ball = track.cutter.shape == CutterShape::Ball;
         let (mut a, mut b) = (m.from, m.to);
         if a.z < b.z {
             (a, b) = (b, a);
+        }
+        if let Profile::Turned(form) = &profile {
+            let n = (a.distance(b) / r.max(4.0 * pitch)).ceil().max(1.0);
+            let at = |k: usize| a + (b - a) * (k as f64 / n);
+            return (0..n as usize)
+                .filter_map(|k| self.turned(at(k), at(k + 1), form, limit_mm))
+                .max_by(|x, y| x.0.total_cmp(&y.0));
         }
         let run = (b - a).truncate().length();
         let mut n = (a.distance(b) / r.max(4.0 * pitch)).ceil();
@@ -173,6 +186,33 @@ impl<'a> Walls<'a> {
                 if d < reach {
                     reach = d;
                     worst = Some((r - d, (p + q + s) / 3.0));
+                }
+            }
+        });
+        worst
+    }
+
+    /// A convex form whose tip runs from `a` down to `b`.
+    fn turned(&self, a: DVec3, b: DVec3, form: &Turned, limit_mm: f64) -> Option<(f64, DVec3)> {
+        let mut worst: Option<(f64, DVec3)> = None;
+        let (a2, b2) = (a.truncate(), b.truncate());
+        let half_mm = self.field.grid().pitch_mm * std::f64::consts::FRAC_1_SQRT_2;
+        let floor = b.z + limit_mm;
+        self.near(Box3::of(&[a, b]), form.radius_mm() - limit_mm, floor, |corners| {
+            let middle = (corners[0] + corners[3]).truncate() * 0.5;
+            let near = (point_to_segment2(middle, a2, b2).sqrt() - half_mm).max(0.0);
+            let top = corners.iter().map(|c| c.z).fold(f64::NEG_INFINITY, f64::max);
+            if near >= form.radius_mm() - limit_mm || top <= floor + form.height(near) {
+                return;
+            }
+            for [p, q, s] in triangles(corners) {
+                let across = |t: f64| (p + (q - p) * t, p + (s - p) * t);
+                for (from, to) in [(p, q), (q, s), (s, p), across(0.25), across(0.5), across(0.75)]
+                {
+                    let (depth, at) = deepest(from, to, |x| inside(form, a, b, x));
+                    if depth > limit_mm && worst.is_none_or(|w| depth > w.0) {
+                        worst = Some((depth, at));
+                    }
                 }
             }
         });
@@ -240,6 +280,35 @@ impl<'a> Walls<'a> {
             }
         }
     }
+}
+
+/// How deep `x` lies in a form whose tip runs from `a` down to `b`, where the form comes lowest over it, mm; negative
+/// outside.
+fn inside(form: &Turned, a: DVec3, b: DVec3, x: DVec3) -> f64 {
+    let (run, to) = ((a - b).truncate(), (x - b).truncate());
+    let length = run.length();
+    if length < 1e-9 {
+        return form.depth(to.length(), x.z - b.z);
+    }
+    let (u, slope) = (run / length, (a.z - b.z) / length);
+    let aside = u.perp_dot(to).abs();
+    if aside >= form.radius_mm() {
+        return form.radius_mm() - aside;
+    }
+    let s = u.dot(to);
+    let at = (s - form.touch_along(aside, slope)).clamp(0.0, length);
+    form.depth((aside * aside + (s - at) * (s - at)).sqrt(), x.z - b.z - slope * at)
+}
+
+/// The highest value of a concave function on the segment from `p` to `q`, and where.
+fn deepest(p: DVec3, q: DVec3, depth: impl Fn(DVec3) -> f64) -> (f64, DVec3) {
+    let (mut lo, mut hi) = (0.0, 1.0);
+    for _ in 0..THIRDS {
+        let (u, v) = (lo + (hi - lo) / 3.0, hi - (hi - lo) / 3.0);
+        if depth(p + (q - p) * u) < depth(p + (q - p) * v) { lo = u } else { hi = v }
+    }
+    let at = p + (q - p) * (0.5 * (lo + hi));
+    [p, at, q].map(|x| (depth(x), x)).into_iter().max_by(|x, y| x.0.total_cmp(&y.0)).expect("three")
 }
 
 fn worse(a: Option<Overcut>, b: Option<Overcut>) -> Option<Overcut> {

@@ -18,6 +18,7 @@
 //!
 //! Culling may always keep a node too many: every height computed here is one that the move really cuts.
 
+use super::drawn::Drawn;
 use crate::cutter::Profile;
 use crate::geom::{DVec2, DVec3, Move};
 
@@ -29,19 +30,19 @@ pub(super) struct Span {
 }
 
 impl Span {
-    const EMPTY: Self = Self { lo: f64::INFINITY, hi: f64::NEG_INFINITY };
+    pub(super) const EMPTY: Self = Self { lo: f64::INFINITY, hi: f64::NEG_INFINITY };
     const ALL: Self = Self { lo: f64::NEG_INFINITY, hi: f64::INFINITY };
 
-    fn new(lo: f64, hi: f64) -> Self {
+    pub(super) fn new(lo: f64, hi: f64) -> Self {
         Self { lo, hi }
     }
 
-    fn meet(self, o: Self) -> Self {
+    pub(super) fn meet(self, o: Self) -> Self {
         Self { lo: self.lo.max(o.lo), hi: self.hi.min(o.hi) }
     }
 
     /// The smallest interval that holds both.
-    fn hull(self, o: Self) -> Self {
+    pub(super) fn hull(self, o: Self) -> Self {
         if self.lo > self.hi {
             o
         } else if o.lo > o.hi {
@@ -64,7 +65,7 @@ impl Span {
 pub(super) const SPAN_SLACK_MM: f64 = 1e-6;
 
 /// A move shorter than this in plan is a plunge or a retract, mm.
-const VERTICAL_MM: f64 = 1e-9;
+pub(super) const VERTICAL_MM: f64 = 1e-9;
 
 /// The cutting end with what the formulas need of it.
 #[derive(Debug, Clone, Copy)]
@@ -169,11 +170,13 @@ pub(super) struct Left {
 
 /// Something that removes wood row by row.
 #[derive(Debug, Clone, Copy)]
-pub(super) enum Sweep {
+pub(super) enum Sweep<'a> {
     /// A cutter standing at a point: plunges, retracts and the wedges at joints.
     Stamp(Stamp),
     /// A cutter moving along a segment.
     Along(Along),
+    /// A cutter of any other convex form moving along a segment.
+    Turned(Drawn<'a>),
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -270,7 +273,7 @@ impl Joint {
     }
 }
 
-impl Sweep {
+impl Sweep<'_> {
     /// The volume of one move between the joints at its start and its end.
     pub(super) fn of(mv: &Move, tip: Tip, joints: [Joint; 2]) -> Self {
         let Some(course) = Course::of(mv) else {
@@ -307,6 +310,7 @@ impl Sweep {
     /// Lowest and highest y it can touch.
     pub(super) fn y_range(&self) -> (f64, f64) {
         match self {
+            Self::Turned(t) => t.y_range(),
             Self::Stamp(s) => (s.at.y - s.tip.radius, s.at.y + s.tip.radius),
             Self::Along(a) => {
                 let (u, r) = (a.dir.u, a.tip.radius);

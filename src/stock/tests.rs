@@ -1,4 +1,5 @@
 use super::*;
+use crate::cutter::tests::convex_forms;
 use crate::geom::{DVec3, MoveKind};
 use crate::job::{Origin, Wood};
 use proptest::prelude::*;
@@ -93,7 +94,7 @@ fn single_moves_sweep_their_analytic_volume() {
         mv([-2.0, 4.0, -1.0], [20.0, 5.0, -2.0]),
     ];
     for m in moves {
-        for profile in [BALL, FLAT] {
+        for profile in [BALL, FLAT].into_iter().chain(convex_forms()) {
             let mut b = block(0.25);
             let contact = b.cut(&profile, &[m])[0];
             check(&b, &profile, &[m]);
@@ -144,10 +145,57 @@ fn chains_of_any_turn_equal_a_search() {
         [3.0, 8.0, -3.0],
         [3.0, 8.0, 1.0],
     ]);
-    for profile in [BALL, FLAT] {
+    for profile in [BALL, FLAT].into_iter().chain(convex_forms()) {
         let mut b = block(0.25);
         b.cut(&profile, &zigzag);
         check(&b, &profile, &zigzag);
+    }
+}
+
+/// A convex form with a radius that puts no node on a rim.
+fn slim(which: usize) -> Profile {
+    convex_forms().swap_remove(which).slimmed(0.01731)
+}
+
+/// What a move leaves lies no higher than what is stamped at close places along it, and lower by no more than the tip
+/// can sink and the profile can rise from one place to the next.
+#[test]
+fn a_sweep_is_bounded_by_dense_stamps() {
+    let moves = [
+        mv([3.0, 3.0, -1.0], [9.0, 3.0, -1.0]),
+        mv([3.0, 3.0, -0.5], [9.0, 6.5, -2.5]),
+        mv([9.0, 3.0, -0.5], [7.5, 7.0, -6.5]),
+    ];
+    for m in moves {
+        for profile in (0..12).map(slim) {
+            let mut b = block(0.25);
+            b.cut(&profile, &[m]);
+            let stamps = 3000_i32;
+            let step = m.length_mm() / f64::from(stamps);
+            let (grid, r) = (*b.field().grid(), profile.radius_mm());
+            for n in 0..grid.len() {
+                let p = grid.node(n % grid.nx, n / grid.nx);
+                let (mut low, mut off) = (0.0_f64, 0.0);
+                for k in 0..=stamps {
+                    let at = m.from + (m.to - m.from) * (f64::from(k) / f64::from(stamps));
+                    let d = at.truncate().distance(p);
+                    if let Some(h) = profile.height_at(d)
+                        && at.z + h < low
+                    {
+                        (low, off) = (at.z + h, d);
+                    }
+                }
+                let got = f64::from(b.field().z()[n]);
+                assert!(got <= low + 1e-6, "{profile:?} {p}: {got}, stamped {low}");
+                // Near the rim a stamp may miss a node altogether.
+                if off < r - 2.0 * step && low < 0.0 {
+                    let height = |d: f64| profile.height_at(d.clamp(0.0, r)).unwrap();
+                    let sink = step + height(off) - height(off - step);
+                    let rise = height(off + step) - height(off);
+                    assert!(got >= low - sink.max(rise) - step, "{profile:?} {p}: {got} {low}");
+                }
+            }
+        }
     }
 }
 
@@ -161,7 +209,7 @@ proptest! {
         points in prop::collection::vec(
             (0.0f64..12.0, 0.0f64..10.0, -4.0f64..0.3, 0u8..4), 2..24),
         step in prop_oneof![Just(0.05), Just(0.4), Just(1.0)],
-        ball: bool,
+        which in 0usize..24,
     ) {
         // Short steps, some of them level, some collinear, some vertical.
         let mut path = vec![[6.0, 5.0, -1.0]];
@@ -180,7 +228,11 @@ proptest! {
         }
         let moves = chain(&path);
         // A radius that puts no node on a rim.
-        let profile = if ball { BALL } else { Profile::Flat { radius_mm: 1.6173 } };
+        let profile = match which {
+            0..6 => BALL,
+            6..12 => Profile::Flat { radius_mm: 1.6173 },
+            _ => slim(which - 12),
+        };
         let mut whole = block(0.2);
         whole.cut(&profile, &moves);
         let mut alone = block(0.2);
@@ -206,7 +258,7 @@ proptest! {
     fn a_gently_winding_chain_equals_its_moves_alone(
         turns in prop::collection::vec((-0.2f64..0.2, -0.3f64..0.3), 20..60),
         heading in 0.0f64..6.3,
-        ball: bool,
+        which in 0usize..24,
     ) {
         let (mut heading, mut slope) = (heading, 0.0_f64);
         let mut path = vec![[6.0, 5.0, -2.0]];
@@ -218,7 +270,11 @@ proptest! {
             path.push([x + step * libm::cos(heading), y + step * libm::sin(heading), z + step * slope]);
         }
         let moves = chain(&path);
-        let profile = if ball { BALL } else { Profile::Flat { radius_mm: 1.6173 } };
+        let profile = match which {
+            0..6 => BALL,
+            6..12 => Profile::Flat { radius_mm: 1.6173 },
+            _ => slim(which - 12),
+        };
         let mut whole = block(0.1);
         whole.cut(&profile, &moves);
         let mut alone = block(0.1);

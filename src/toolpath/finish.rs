@@ -10,6 +10,7 @@
 use super::emit::Emitter;
 use super::left::Surfaces;
 use super::raster::{Passes, clear_deep_wood, passes, stepover_of_scallop};
+use super::trace::LEAST_ROUNDING_MM;
 use super::waterline::{Waterlines, waterlines};
 use super::{Site, ToolpathError};
 use crate::cutter::Profile;
@@ -40,7 +41,7 @@ pub(super) fn finish(
     out: &mut Emitter,
 ) -> Result<(), ToolpathError> {
     let profile = Profile::of(&site.operation.cutter);
-    let stepover_mm = stepover_of_scallop(&profile, scallop_mm).ok_or_else(|| {
+    let stepover_mm = stepover_of_scallop(&site.operation.cutter, scallop_mm).ok_or_else(|| {
         let cutter = site.operation.cutter.name.clone();
         ToolpathError::ScallopWithoutBall { operation: site.number, cutter }
     })?;
@@ -49,8 +50,9 @@ pub(super) fn finish(
     let done = passes(site, &all, block, out)?;
     out.note_deep_pass(done.deepest_mm);
     block.cut(&profile, &out.moves()[done.first..]);
-    let tip = tip_field(site.target, &profile);
-    let reach = closing(&tip, &profile);
+    let rolled = profile.rolled(LEAST_ROUNDING_MM);
+    let tip = tip_field(site.target, &rolled);
+    let reach = closing(&tip, &rolled);
     let limit_mm = scallop_mm + SPARE * site.job.tolerance.gouge_mm;
     let stepover_mm = FRAC_1_SQRT_2 * stepover_mm;
     let lines = Waterlines { tip: &tip, reach: &reach, step_mm: stepover_mm, limit_mm };

@@ -78,12 +78,8 @@ pub(crate) fn job(
 
 /// A cutter of this shape and diameter.
 pub(crate) fn cutter(shape: CutterShape, diameter_mm: f64) -> CutterSpec {
-    let word = match shape {
-        CutterShape::Flat => "flat",
-        CutterShape::Ball => "ball",
-    };
     CutterSpec {
-        name: format!("{word}-{diameter_mm}"),
+        name: format!("{}-{diameter_mm}", shape.word()),
         shape,
         diameter_mm,
         flutes: 2,

@@ -11,11 +11,11 @@ use super::emit::{Emitter, feed_seconds, lift_seconds};
 use super::fit::fit;
 use super::rough::{Rough, rough};
 use super::rows::{Row, rim, rows, slanted_rim};
-use super::trace::{Sample, Tracer};
+use super::trace::{LEAST_ROUNDING_MM, Sample, Tracer};
 use super::{Site, ToolpathError};
 use crate::cutter::Profile;
 use crate::geom::{DVec2, DVec3};
-use crate::job::Stepover;
+use crate::job::{CutterSpec, Stepover};
 use crate::offset::Dropper;
 use crate::stock::Block;
 use rayon::prelude::*;
@@ -38,14 +38,17 @@ const ENTRY_ROOM_MM: f64 = 2.0;
 /// A link that takes more than this many times the time of the straight way has met a wall.
 const STRAIGHT_ENOUGH: f64 = 2.0;
 
-/// Distance of passes that leaves cusps of `scallop_mm` on level ground, mm: s = 2 sqrt(2 R h - h^2).
-/// `None` for a cutter without a round end, whose cusps have no such height.
-pub(super) fn stepover_of_scallop(profile: &Profile, scallop_mm: f64) -> Option<f64> {
-    match *profile {
+/// Distance of passes that leaves cusps of `scallop_mm` on level ground, mm: s = 2 sqrt(2 R h - h^2) on a ball; on a cone
+/// above the ball twice the radius at that height. `None` for a cutter without a round tip, whose cusps have no such
+/// height.
+pub(super) fn stepover_of_scallop(cutter: &CutterSpec, scallop_mm: f64) -> Option<f64> {
+    cutter.ball_mm()?;
+    match Profile::of(cutter) {
         Profile::Ball { radius_mm } => {
             let h = scallop_mm.min(radius_mm);
             Some(2.0 * (2.0 * radius_mm * h - h * h).sqrt())
         }
+        Profile::Turned(form) => Some(2.0 * form.radius_at(scallop_mm)),
         Profile::Flat { .. } => None,
     }
 }
@@ -62,9 +65,11 @@ pub(super) fn raster(
     let stepover_mm = match stepover {
         Stepover::Plan(s) => s,
         Stepover::Scallop(h) => {
-            stepover_of_scallop(&profile, h).ok_or_else(|| ToolpathError::ScallopWithoutBall {
-                operation: site.number,
-                cutter: site.operation.cutter.name.clone(),
+            stepover_of_scallop(&site.operation.cutter, h).ok_or_else(|| {
+                ToolpathError::ScallopWithoutBall {
+                    operation: site.number,
+                    cutter: site.operation.cutter.name.clone(),
+                }
             })?
         }
     };
@@ -104,11 +109,12 @@ pub(super) fn passes(
     out: &mut Emitter,
 ) -> Result<Passed, ToolpathError> {
     let profile = Profile::of(&site.operation.cutter);
-    let dropper = Dropper::new(site.target, profile);
-    let wood = Dropper::new(block.field(), profile);
+    let wood = Dropper::new(block.field(), profile.clone());
+    let rolled = profile.rolled(LEAST_ROUNDING_MM);
+    let dropper = Dropper::new(site.target, rolled.clone());
     let fit_mm = site.job.tolerance.fit_mm;
     let pitch = site.target.grid().pitch_mm;
-    let tracer = Tracer::new(|p: DVec2| dropper.drop(p), profile, pitch, fit_mm);
+    let tracer = Tracer::new(|p: DVec2| dropper.drop(p), rolled, pitch, fit_mm);
     site.refuse_endless(cut.angle_rad, cut.stepover_mm, tracer.spacing_mm())?;
 
     let bounds = site.job.stock.bounds();
@@ -120,7 +126,7 @@ pub(super) fn passes(
     });
     let spans: Vec<Vec<Span>> =
         rows.into_par_iter().map(|row| row_spans(site, cut, &row, &tracer)).collect();
-    let deepest_mm = deepest_pass_mm(&spans, block, site.operation.cutter.diameter_mm);
+    let deepest_mm = deepest_pass_mm(&spans, block, site.operation.cutter.working_mm());
     let link = |done: &[DVec3], next: &[DVec3]| link(site, &tracer, done, next);
     let first = out.moves().len();
     for chain in chains(spans, link) {
@@ -243,7 +249,7 @@ pub(super) fn clear_deep_wood(
     block: &mut Block,
     out: &mut Emitter,
 ) -> Result<(), ToolpathError> {
-    let diameter = site.operation.cutter.diameter_mm;
+    let diameter = site.operation.cutter.working_mm();
     for turn in [0.0, std::f64::consts::FRAC_PI_2] {
         let levels = Rough {
             leave_mm: LEVELS_LEAVE_PER_DIAMETER * diameter,

@@ -3,7 +3,7 @@
 use super::chain::{Span, chains};
 use super::emit::{Emitter, feed_seconds, lift_seconds};
 use super::rows::{Row, rows};
-use super::trace::{DROP_MM, Sample, Tracer};
+use super::trace::{DROP_MM, LEAST_ROUNDING_MM, Sample, Tracer};
 use super::{Site, ToolpathError};
 use crate::cutter::Profile;
 use crate::geom::{DVec2, DVec3};
@@ -50,8 +50,8 @@ pub(super) fn rough(
     out: &mut Emitter,
 ) -> Result<(), ToolpathError> {
     let profile = Profile::of(&site.operation.cutter);
-    let inflated = profile.inflated(cut.leave_mm);
-    let dropper = Dropper::new(site.target, inflated);
+    let inflated = profile.inflated(cut.leave_mm).rolled(LEAST_ROUNDING_MM);
+    let dropper = Dropper::new(site.target, inflated.clone());
     let pitch = site.target.grid().pitch_mm;
     let tracer = Tracer::new(
         |p: DVec2| dropper.drop(p) + cut.leave_mm,

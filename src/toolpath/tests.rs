@@ -92,6 +92,19 @@ fn gouges(field: &Heightfield, profile: &Profile, tip: DVec3, slack: f64) -> boo
         Profile::Flat { radius_mm: r } => triangles(field, tip.truncate(), r)
             .iter()
             .any(|&t| highest_in_disc(tip.truncate(), r - slack, t) > tip.z + slack),
+        Profile::Turned(ref form) => {
+            // Points on the triangles, an eighth of a side apart.
+            let r = form.radius_mm();
+            triangles(field, tip.truncate(), r).iter().any(|&[a, b, c]| {
+                (0..=8).any(|i| {
+                    (0..=8 - i).any(|j| {
+                        let at = |k: i32| f64::from(k) / 8.0;
+                        let x = a + (b - a) * at(i) + (c - a) * at(j) - tip;
+                        form.depth(x.truncate().length(), x.z) > slack
+                    })
+                })
+            })
+        }
     }
 }
 
@@ -221,8 +234,8 @@ proptest! {
         let job = job(SIZE.x, SIZE.y, 10.0, 0.25, Vec::new());
         let target = relief(&job, 3.0, 0.0, &bumps);
         let profile = Profile::Ball { radius_mm: 0.5 * diameter };
-        let dropper = Dropper::new(&target, profile);
-        let tracer = Tracer::new(|p: DVec2| dropper.drop(p), profile, 0.25, 0.004);
+        let dropper = Dropper::new(&target, profile.clone());
+        let tracer = Tracer::new(|p: DVec2| dropper.drop(p), profile.clone(), 0.25, 0.004);
         let (a, b) = (DVec2::new(0.0, y), DVec2::new(SIZE.x, y));
         let path = tracer.trace(a, b);
         let fitted = fit(&path, 0.004);
@@ -316,7 +329,7 @@ fn a_raster_leaves_no_more_than_the_scallop() {
 #[test]
 fn roughing_clears_a_level_ground_down_to_the_allowance() {
     for shape in [CutterShape::Flat, CutterShape::Ball] {
-        let job = job(24.0, 15.0, 10.0, 0.25, vec![rough(cutter(shape, 6.0), 0.5, 1.5)]);
+        let job = job(24.0, 15.0, 10.0, 0.25, vec![rough(cutter(shape.clone(), 6.0), 0.5, 1.5)]);
         let target = relief(&job, 4.0, 0.0, &[]);
         let path = &plan_quietly(&job, &target)[0];
         let mut wood = Heightfield::flat(*target.grid(), 0.0);

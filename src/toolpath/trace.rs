@@ -11,6 +11,9 @@
 //!         middle agrees or it is so short that no more than the budget can hide beside it.
 //! ```
 //!
+//! A cutter of any other form is a body along whose whole underside a ball rolls ([`Profile::rolled`]): of the balls that
+//! fill it, each obeys the ball's law, so that law holds with the radius of that ball.
+//!
 //! Those points keep the target whole. Where the path bends upwards, more are put in so that no valley is missed.
 
 use crate::cutter::Profile;
@@ -18,6 +21,10 @@ use crate::geom::DVec2;
 
 /// How deep a straight chord between exact drops may enter the target, mm normal to it.
 pub(super) const DROP_MM: f64 = 0.002;
+
+/// Edges of a cutter are planned as if rounded by this, outward: no edge that cuts wood is sharper for long, and it says
+/// how far apart points may lie, mm.
+pub(super) const LEAST_ROUNDING_MM: f64 = 0.01;
 
 /// Steps beside a valley are halved at most this often.
 const MOST_HALVINGS: usize = 8;
@@ -45,7 +52,7 @@ pub(super) struct Tracer<F> {
 impl<F: Fn(DVec2) -> f64> Tracer<F> {
     /// Samples at the target's pitch, or closer for a small cutter.
     pub(super) fn new(drop: F, profile: Profile, pitch_mm: f64, fit_mm: f64) -> Self {
-        let level = (8.0 * profile.radius_mm() * DROP_MM).sqrt();
+        let level = (8.0 * roundness_mm(&profile) * DROP_MM).sqrt();
         Self { drop, profile, spacing_mm: pitch_mm.min(level), valley_mm: fit_mm.max(DROP_MM) }
     }
 
@@ -96,9 +103,9 @@ impl<F: Fn(DVec2) -> f64> Tracer<F> {
         let (run, rise) = (b.s - a.s, b.z - a.z);
         let clear = match self.profile {
             Profile::Flat { .. } => rise.abs() <= DROP_MM || run <= DROP_MM,
-            Profile::Ball { .. } => {
+            Profile::Ball { .. } | Profile::Turned(_) => {
                 let l2 = run * run + rise * rise;
-                l2 <= 8.0 * self.profile.radius_mm() * DROP_MM || run <= 1e-4
+                l2 <= 8.0 * roundness_mm(&self.profile) * DROP_MM || run <= 1e-4
             }
         };
         if clear || depth > 24 {
@@ -152,5 +159,13 @@ impl<F: Fn(DVec2) -> f64> Tracer<F> {
         next.extend_from_slice(&path[done..]);
         *path = next;
         true
+    }
+}
+
+/// Radius of the ball that the law of chords is about, mm; for a flat that of the disc.
+fn roundness_mm(profile: &Profile) -> f64 {
+    match profile {
+        Profile::Turned(form) => form.roundness_mm(),
+        _ => profile.radius_mm(),
     }
 }

@@ -11,7 +11,7 @@ use super::chain::{Span, chains};
 use super::emit::Emitter;
 use super::left::{Left, Surfaces};
 use super::raster::{TOP_MM, link};
-use super::trace::{DROP_MM, Tracer};
+use super::trace::{DROP_MM, LEAST_ROUNDING_MM, Tracer};
 use crate::cutter::Profile;
 use crate::geom::{DVec2, DVec3, Grid, Heightfield};
 use crate::offset::Dropper;
@@ -67,11 +67,12 @@ pub(super) fn waterlines(site: &Site, lines: &Waterlines, block: &mut Block, out
     if high <= low {
         return;
     }
-    let exact = Dropper::new(site.target, profile);
+    let rolled = profile.rolled(LEAST_ROUNDING_MM);
+    let exact = Dropper::new(site.target, rolled.clone());
     let pitch_mm = site.target.grid().pitch_mm;
     let fit_mm = site.job.tolerance.fit_mm;
-    let tracer = Tracer::new(|p: DVec2| exact.drop(p), profile, pitch_mm, fit_mm);
-    let slim = Dropper::new(site.target, profile.slimmed(DROP_MM));
+    let slim = Dropper::new(site.target, rolled.slimmed(DROP_MM));
+    let tracer = Tracer::new(|p: DVec2| exact.drop(p), rolled, pitch_mm, fit_mm);
     let levels = ((high - low) / lines.step_mm).ceil() as usize;
     for k in 0..levels {
         let z = low + k as f64 * lines.step_mm;
@@ -88,7 +89,7 @@ pub(super) fn waterlines(site: &Site, lines: &Waterlines, block: &mut Block, out
         if spans.is_empty() {
             continue;
         }
-        let wood = Dropper::new(block.field(), profile);
+        let wood = Dropper::new(block.field(), profile.clone());
         let link = |done: &[DVec3], next: &[DVec3]| link(site, &tracer, done, next);
         let before = out.moves().len();
         for chain in chains(nearest_first(spans), link) {

@@ -357,3 +357,65 @@ fn settings_of_surfaces_that_do_not_belong_together_are_refused() {
         refused(&layer(surface), kind, (5, column), &words);
     }
 }
+
+#[test]
+fn cutters_that_cannot_be_are_refused() {
+    let refuse = |form: &str, words: &[&str]| {
+        let text = with(&format!(
+            "[[operation]]\nkind = \"raster\"\ncutter = {{ {form}, diameter_mm = 6, flute_mm = 12, stickout_mm = 40 }}\n"
+        ));
+        let error = job(&text).map(|_| ()).expect_err(form);
+        assert_eq!(error.line(), Some(5), "{form}: {error}");
+        let shown = error.to_string();
+        for word in words {
+            assert!(shown.contains(word), "'{word}' is not in\n{shown}");
+        }
+    };
+    refuse("shape = \"bull\"", &["`corner_mm` is missing", "add corner_mm"]);
+    refuse("shape = \"bull\", corner_mm = 3.5", &["does not fit", "at most half the diameter: 3"]);
+    refuse("shape = \"v\"", &["`angle_deg` is missing"]);
+    refuse("shape = \"v\", angle_deg = 180", &["between 1 and 175"]);
+    refuse("shape = \"v\", angle_deg = 60, tip_mm = 6", &["not narrower than the cutter"]);
+    refuse(
+        "shape = \"v\", angle_deg = 20",
+        &["end before this v cutter is 6 mm wide", "at least 17.014"],
+    );
+    refuse("shape = \"tapered\", tip_mm = 1", &["`taper_deg` is missing"]);
+    refuse("shape = \"tapered\", taper_deg = 10", &["`tip_mm` is missing"]);
+    refuse(
+        "shape = \"tapered\", tip_mm = 0, taper_deg = 10",
+        &["a ball at its tip", "shape = \"v\""],
+    );
+    refuse("shape = \"flat\", corner_mm = 1", &["`corner_mm` means nothing to a flat cutter"]);
+    refuse("shape = \"ball\", tip_mm = 1", &["`tip_mm` means nothing to a ball cutter"]);
+    refuse("shape = \"bull\", corner_mm = 1, taper_deg = 3", &["`taper_deg` means nothing"]);
+    refuse(
+        "shape = \"v\", angle_deg = 60, profile = [[3, 0]]",
+        &["`profile` means nothing to a v"],
+    );
+    refuse("shape = \"table\"", &["`profile` is missing"]);
+    refuse("shape = \"table\", profile = []", &["pairs [radius, value]"]);
+    refuse("shape = \"table\", profile = [[0, 0.1], [3, 1]]", &["begins at height 0.1"]);
+    refuse(
+        "shape = \"table\", profile = [[0, 0], [2, 1]]",
+        &["ends at radius 2", "last radius is 3"],
+    );
+    refuse("shape = \"table\", profile = [[1, 0], [1, 1]]", &["radius must be above the last one"]);
+    refuse("shape = \"table\", profile = [[0, 0], [1, 2], [3, 3]]", &["bends back at [1, 2]"]);
+    refuse("shape = \"table\", profile = [[0, 0], [1, 2], [3, 1]]", &["bends back at [1, 2]"]);
+    refuse("shape = \"vee\"", &["shape", "flat, ball, bull, v, tapered, table"]);
+}
+
+#[test]
+fn pointed_cutters_must_be_told_the_distance_of_their_passes() {
+    let kind = |e: &JobError| matches!(e, JobError::Impossible(_));
+    for word in ["raster", "rough"] {
+        let text = with(&format!("[[operation]]\nkind = \"{word}\"\ncutter = \"v-60\"\n"));
+        refused(
+            &text,
+            kind,
+            (5, 10),
+            &["no rule gives the distance of the passes", "give stepover_mm"],
+        );
+    }
+}

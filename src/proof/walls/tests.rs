@@ -36,13 +36,41 @@ fn a_wall_overcut_by_a_fiftieth_is_caught_at_any_place_in_the_cell() {
             if shape == CutterShape::Ball && z + 1.5 > -0.1 {
                 continue;
             }
-            let v = along(shape, x + 0.02, z);
+            let v = along(shape.clone(), x + 0.02, z);
             let f = v.failures.iter().find(|f| f.kind == FailureKind::Gouge);
             let f = f.unwrap_or_else(|| panic!("{shape:?} at {z} passes"));
             assert!([10, 11].contains(&f.line), "{f}");
             assert!((f.amount - 0.02).abs() < 2e-3, "{shape:?} {z}: {f}");
             assert_eq!(v.gouge.unwrap().depth_mm, f.amount);
-            let v = along(shape, x + 0.008, z);
+            let v = along(shape.clone(), x + 0.008, z);
+            assert!(v.passed(), "{shape:?} {z}: {:#?}", v.failures);
+        }
+    }
+}
+
+#[test]
+fn a_wall_overcut_by_a_convex_form_is_caught_at_its_normal_depth() {
+    let (half, taper) = (30_f64.to_radians(), 5_f64.to_radians());
+    for k in 0..7_i32 {
+        let z = -2.0 + 0.2 * f64::from(k);
+        // Bull: the wall's plane 20 (x - 20) = z + 2 lies the corner's radius from the corner's centre.
+        let bull = 20.0 + ((z + 0.5 + 2.0) - 0.5 * 401.0_f64.sqrt()) / 20.0 - 1.0;
+        // Cones lean over the wall's plane and meet its upper edge at (20.1, 0).
+        let v = 20.1 - (-z * libm::tan(half)).min(1.5);
+        let tangent = 0.5 * libm::cos(taper);
+        let tapered = 20.1 - tangent - (-z - 0.5 + 0.5 * libm::sin(taper)) * libm::tan(taper);
+        let cases = [
+            (CutterShape::Bull { corner_mm: 0.5 }, bull, 20.0 / 401.0_f64.sqrt()),
+            (CutterShape::V { angle_rad: 2.0 * half, tip_mm: 0.0 }, v, libm::cos(half)),
+            (CutterShape::Tapered { tip_mm: 1.0, taper_rad: taper }, tapered, libm::cos(taper)),
+        ];
+        for (shape, x, normal) in cases {
+            let v = along(shape.clone(), x + 0.02 / normal, z);
+            let f = v.failures.iter().find(|f| f.kind == FailureKind::Gouge);
+            let f = f.unwrap_or_else(|| panic!("{shape:?} at {z} passes"));
+            assert!([10, 11].contains(&f.line), "{f}");
+            assert!((f.amount - 0.02).abs() < 2e-3, "{shape:?} {z}: {f}");
+            let v = along(shape.clone(), x + 0.008 / normal, z);
             assert!(v.passed(), "{shape:?} {z}: {:#?}", v.failures);
         }
     }

@@ -1,0 +1,84 @@
+//! Whole small jobs with every form of cutter: planned, written, read back and proved.
+
+use crate::geom::DVec2;
+use crate::job::{CutterShape, Operation, Stepover};
+use crate::proof::{Leftover, ProgramText, prove};
+use crate::toolpath::fixture::{Bump, cutter, finish, job, raster, relief, rough};
+use crate::toolpath::plan;
+
+/// A rolling ground with a dome, a tower with walls and another one at the rim.
+fn bumps() -> Vec<Bump> {
+    let bump = |x: f64, y: f64, radius_mm, height_mm, wall| Bump {
+        at: DVec2::new(x, y),
+        radius_mm,
+        height_mm,
+        wall,
+    };
+    vec![
+        bump(4.0, 4.0, 3.0, 2.0, false),
+        bump(9.0, 5.0, 1.3, 1.7, true),
+        bump(12.0, 0.5, 2.0, 2.5, true),
+    ]
+}
+
+fn carve(shape: CutterShape, diameter_mm: f64, stepover: Stepover, angle_deg: f64) {
+    prove_after_roughing(raster(cutter(shape, diameter_mm), stepover, angle_deg));
+}
+
+fn prove_after_roughing(finishing: Operation) -> Leftover {
+    let shape = finishing.cutter.shape.clone();
+    let roughing = rough(cutter(CutterShape::Flat, 3.0), 0.3, 1.5);
+    let mut job = job(13.0, 9.0, 10.0, 0.2, vec![roughing, finishing]);
+    job.safe_z_mm = 5.0;
+    let target = relief(&job, 3.0, 0.0, &bumps());
+    let paths = plan(&job, &target, &mut |_| {}).unwrap();
+    let texts: Vec<String> =
+        paths.iter().map(|p| crate::gcode::write::write(p, &[], &job)).collect();
+    let programs: Vec<ProgramText> = paths
+        .iter()
+        .zip(&texts)
+        .map(|(path, text)| ProgramText { name: &path.name, text, cutter: &path.cutter })
+        .collect();
+    let reach = crate::offset::reach(&job, &target);
+    let verdict = prove(&programs, &job, &target, &reach).unwrap();
+    assert!(verdict.passed(), "{shape:?}: {:#?}", verdict.failures);
+    assert!(verdict.leftover.reachable.nodes > 100, "{shape:?}: {:?}", verdict.leftover);
+    verdict.leftover
+}
+
+#[test]
+fn a_v_cutter_carves() {
+    let shape = CutterShape::V { angle_rad: 60_f64.to_radians(), tip_mm: 0.2 };
+    carve(shape, 6.0, Stepover::Plan(0.2), 0.0);
+}
+
+#[test]
+fn a_pointed_v_cutter_carves() {
+    let shape = CutterShape::V { angle_rad: 90_f64.to_radians(), tip_mm: 0.0 };
+    carve(shape, 6.0, Stepover::Plan(0.4), 30.0);
+}
+
+#[test]
+fn a_tapered_ball_carves() {
+    let shape = CutterShape::Tapered { tip_mm: 1.0, taper_rad: 5_f64.to_radians() };
+    carve(shape.clone(), 1.2, Stepover::Scallop(0.02), 90.0);
+    carve(shape, 3.0, Stepover::Scallop(0.03), 0.0);
+}
+
+#[test]
+fn a_tapered_ball_finishes() {
+    let shape = CutterShape::Tapered { tip_mm: 1.0, taper_rad: 5_f64.to_radians() };
+    let left = prove_after_roughing(finish(cutter(shape, 3.0), 0.01));
+    assert!(left.over_fraction == 0.0, "{left:?}");
+}
+
+#[test]
+fn a_bull_nose_carves() {
+    carve(CutterShape::Bull { corner_mm: 0.5 }, 3.0, Stepover::Plan(0.3), 0.0);
+}
+
+#[test]
+fn a_profile_table_carves() {
+    let shape = CutterShape::Table { profile: vec![(0.2, 0.0), (0.9, 0.3), (1.5, 1.0)] };
+    carve(shape, 3.0, Stepover::Plan(0.4), 0.0);
+}
