@@ -221,17 +221,21 @@ impl Block {
     /// Height of the highest wood under a disc at `p`, mm: never too low, at most by what lies within a cell's
     /// diagonal outside the disc too high. Minus infinity where there is no wood.
     pub fn highest_under(&self, radius_mm: f64, p: DVec2) -> f64 {
+        self.highest_along(radius_mm, p, p)
+    }
+
+    /// As [`Block::highest_under`], under a disc on its straight way from `a` to `b`.
+    pub fn highest_along(&self, radius_mm: f64, a: DVec2, b: DVec2) -> f64 {
         let lattice = Lattice::new(*self.field.grid());
         let grid = lattice.grid;
         let r = radius_mm + grid.pitch_mm * std::f64::consts::SQRT_2;
         let mut highest = f32::NEG_INFINITY;
-        let Some((j0, j1)) = lattice.rows(p.y - r, p.y + r, 0, grid.ny) else {
+        let Some((j0, j1)) = lattice.rows(a.y.min(b.y) - r, a.y.max(b.y) + r, 0, grid.ny) else {
             return f64::NEG_INFINITY;
         };
         for j in j0..=j1 {
-            let dy = grid.node(0, j).y - p.y;
-            let w = (r * r - dy * dy).max(0.0).sqrt();
-            if let Some((i0, i1)) = lattice.columns(p.x - w, p.x + w) {
+            let Some((from, to)) = across_stadium(a, b, r, grid.node(0, j).y) else { continue };
+            if let Some((i0, i1)) = lattice.columns(from, to) {
                 for &z in &self.field.row(j)[i0..=i1] {
                     highest = if z > highest { z } else { highest };
                 }
@@ -263,6 +267,30 @@ impl Block {
         }
         worst
     }
+}
+
+/// The x at which the line at height `y` enters and leaves the places within `r` of the segment from `a` to `b`.
+fn across_stadium(a: DVec2, b: DVec2, r: f64, y: f64) -> Option<(f64, f64)> {
+    let mut span: Option<(f64, f64)> = None;
+    let mut take = |from: f64, to: f64| {
+        span = Some(span.map_or((from, to), |(low, high)| (low.min(from), high.max(to))));
+    };
+    for end in [a, b] {
+        let w2 = r * r - (y - end.y) * (y - end.y);
+        if w2 >= 0.0 {
+            take(end.x - w2.sqrt(), end.x + w2.sqrt());
+        }
+    }
+    // The two long sides.
+    let side = (b - a).normalize_or_zero().perp() * r;
+    for (from, to) in [(a + side, b + side), (a - side, b - side)] {
+        let t = (y - from.y) / (to.y - from.y);
+        if (0.0..=1.0).contains(&t) {
+            let x = from.x + (to.x - from.x) * t;
+            take(x, x);
+        }
+    }
+    span
 }
 
 /// Some rows of the wood.

@@ -14,11 +14,13 @@ mod emit;
 mod finish;
 mod fit;
 mod left;
+mod order;
 mod ramp;
 mod raster;
 mod rough;
 mod rows;
 mod trace;
+mod travel;
 mod waterline;
 
 #[cfg(test)]

@@ -35,7 +35,7 @@ pub enum FailureKind {
     ThroughBottom,
     /// The program moves sideways before it has set its height, or sets it first below safe Z.
     BlindStart,
-    /// A rapid moves sideways below safe Z.
+    /// A rapid moves sideways below safe Z over ground that is not carved yet, or too close to the wood.
     LowRapid,
     /// The tip goes below the stock's top beside the stock, where clamps are.
     OutsideStock,
@@ -171,7 +171,10 @@ fn sentence(f: &Failure) -> String {
                 .to_owned()
         }
         FailureKind::LowRapid => {
-            format!("a rapid moves sideways {a:.2} mm below safe Z ({l:.2}); retract to safe Z before it")
+            format!(
+                "a rapid moves sideways {a:.2} mm below safe Z ({l:.2}), over ground that is not carved yet or closer to \
+                 the wood than clearance_mm; retract before it"
+            )
         }
         FailureKind::OutsideStock => format!(
             "the tip goes {a:.2} mm outside the stock's rectangle below its top, where clamps are; \

@@ -18,6 +18,9 @@ const RUN_BREAK_MM: f64 = 0.1;
 /// How far the tip may stand outside the stock's rectangle, mm.
 const OUTSIDE_MM: f64 = 0.01;
 
+/// Wood this far below the stock's top has been carved, mm.
+const CARVED_MM: f64 = 0.01;
+
 /// Slack of a spindle speed, which the text gives in whole numbers, 1/min.
 const RPM_SLACK: f64 = 0.5;
 
@@ -253,7 +256,41 @@ impl Case<'_> {
                 }
             }
         }
-        block.cut_alone(&profile, moves, |k| alone[k])
+        let low: Vec<usize> = (0..moves.len()).filter(|&k| self.travels_low(&moves[k])).collect();
+        let mut contacts = Vec::with_capacity(moves.len());
+        for next in low.into_iter().chain([moves.len()]) {
+            let first = contacts.len();
+            contacts.extend(block.cut_alone(&profile, &moves[first..next], |k| alone[first + k]));
+            if let Some(m) = moves.get(next) {
+                self.check_low_rapid(block, m);
+            }
+        }
+        contacts
+    }
+
+    /// True for rapids that go sideways below safe Z.
+    fn travels_low(&self, m: &Move) -> bool {
+        m.is_rapid()
+            && m.from.truncate() != m.to.truncate()
+            && m.from.z.min(m.to.z) < self.job.safe_z_mm - LENGTH_SLACK_MM
+    }
+
+    /// Rapids may go sideways below safe Z only where all wood under the cutter has been carved, so that no clamp stands
+    /// there, and `clearance_mm` above it.
+    fn check_low_rapid(&mut self, block: &Block, m: &Move) {
+        let radius_mm = 0.5 * self.text.cutter.diameter_mm - OUTSIDE_MM;
+        let level = Move { from: m.from.with_z(0.0), to: m.to.with_z(0.0), ..*m };
+        let gap_mm = self.job.clearance_mm - LENGTH_SLACK_MM;
+        let stock = self.job.stock.bounds().grown(OUTSIDE_MM);
+        let inside = [m.from, m.to].into_iter().all(|p| stock.contains(p.truncate()));
+        if !inside
+            || block.touch(radius_mm, -CARVED_MM, &level).is_some()
+            || block.touch(radius_mm, -gap_mm, m).is_some()
+        {
+            let (low, safe_z_mm) =
+                (if m.from.z < m.to.z { m.from } else { m.to }, self.job.safe_z_mm);
+            self.fail(FailureKind::LowRapid, m.line, low, safe_z_mm - low.z, safe_z_mm);
+        }
     }
 
     /// Removes the moves in pieces no longer than half the cutter's radius and looks after each whether the
@@ -267,6 +304,9 @@ impl Case<'_> {
         ];
         let mut contacts = Vec::with_capacity(self.program.moves.len());
         for m in &self.program.moves {
+            if self.travels_low(m) {
+                self.check_low_rapid(block, m);
+            }
             let n = (m.length_mm() / piece_mm).ceil().max(1.0);
             let mut contact = Contact::default();
             let mut from = m.from;
@@ -345,16 +385,9 @@ impl Case<'_> {
         }
     }
 
-    /// No way sideways in a rapid below safe Z, none below the stock's top beside it.
+    /// No way below the stock's top beside it.
     fn check_place(&mut self, m: &Move) {
-        let safe_z_mm = self.job.safe_z_mm;
         let low = if m.from.z < m.to.z { m.from } else { m.to };
-        if m.is_rapid()
-            && m.from.truncate() != m.to.truncate()
-            && low.z < safe_z_mm - LENGTH_SLACK_MM
-        {
-            self.fail(FailureKind::LowRapid, m.line, low, safe_z_mm - low.z, safe_z_mm);
-        }
         if low.z >= -LENGTH_SLACK_MM {
             return;
         }

@@ -314,6 +314,23 @@ fn a_low_rapid_sideways_is_caught() {
     assert_eq!(v.failures.len(), 1, "{:#?}", v.failures);
 }
 
+/// Back along its own slot, 2 mm deep, a rapid may go half a millimetre (`clearance_mm`) above the ground; not lower, and not
+/// over wood that is still as high as the stock.
+#[test]
+fn a_low_rapid_is_for_carved_ground_only() {
+    let back = |over: &'static str, to: &'static str| {
+        let mut lines = CLEAN[..13].to_vec();
+        lines.extend([over, to, "G0 Z5", "M5", "M30"]);
+        verdict(&flat_job(), &lines).unwrap()
+    };
+    assert!(back("G0 Z-1.5", "G0 X5").passed());
+    let low =
+        |v: Verdict| v.failures.iter().any(|f| f.kind == FailureKind::LowRapid && f.line == 15);
+    assert!(low(back("G0 Z-1.6", "G0 X5")), "too close to the wood");
+    assert!(low(back("G0 Z2", "G0 Y10")), "clamps may stand there");
+    assert!(low(back("G0 Z2", "G0 X50")), "off the stock");
+}
+
 #[test]
 fn a_feed_beside_the_stock_is_caught() {
     let f =

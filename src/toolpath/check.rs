@@ -46,8 +46,8 @@ pub enum PathFault {
         /// Height of rapid travel, mm.
         safe_z_mm: f64,
     },
-    /// A rapid that is neither vertical nor at safe Z.
-    #[error("toolpath '{name}', move {index}: a rapid travels sideways below the safe height")]
+    /// A rapid below safe Z that is neither vertical nor level.
+    #[error("toolpath '{name}', move {index}: a rapid slants below the safe height")]
     LowRapid {
         /// Name of the toolpath.
         name: String,
@@ -114,7 +114,7 @@ const GRID_MM: f64 = 0.0011;
 
 impl Toolpath {
     /// Checks the laws of every toolpath: moves are continuous and finite, start and end at safe Z, stay above the
-    /// stock's rectangle and within the machine's travel; rapids are vertical or at safe Z; feeds are
+    /// stock's rectangle and within the machine's travel; rapids are vertical, level or at safe Z; feeds are
     /// positive and go down no faster than the plunge limit of the operations that use this cutter.
     ///
     /// # Errors
@@ -173,7 +173,8 @@ impl Toolpath {
         match m.kind {
             MoveKind::Rapid => {
                 let vertical = m.from.truncate() == m.to.truncate();
-                if !vertical && m.from.z.min(m.to.z) < job.safe_z_mm - GRID_MM {
+                if !vertical && m.from.z != m.to.z && m.from.z.min(m.to.z) < job.safe_z_mm - GRID_MM
+                {
                     return Err(PathFault::LowRapid { name: name(), index });
                 }
             }

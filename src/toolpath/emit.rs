@@ -1,11 +1,9 @@
 //! Chains -> moves: rapids, entries, feeds, and coordinates on the grid of the written program.
 
 use super::ramp::ramp_onto;
-use crate::geom::{DVec2, DVec3, Move, MoveKind};
+use super::travel::{RAMP_GAP_MM, Travel};
+use crate::geom::{DVec3, Move, MoveKind};
 use crate::job::{Job, Machine, Operation};
-
-/// Gap above the wood where a ramp begins; down to it the cutter feeds straight through air, mm.
-const RAMP_GAP_MM: f64 = 0.2;
 
 /// Three decimals, z rounded up: the program's text holds exactly what was planned.
 pub(super) fn on_program_grid(p: DVec3) -> DVec3 {
@@ -34,6 +32,11 @@ impl<'a> Emitter<'a> {
         &self.moves
     }
 
+    /// Where the tip is now; `None` before the first move.
+    pub(super) fn at(&self) -> Option<DVec3> {
+        self.moves.last().map(|m| m.to)
+    }
+
     /// Number of chains left out.
     pub(super) fn skipped(&self) -> usize {
         self.skipped
@@ -48,23 +51,34 @@ impl<'a> Emitter<'a> {
         self.deepest_pass_mm = self.deepest_pass_mm.max(depth_mm);
     }
 
-    pub(super) fn into_moves(self) -> Vec<Move> {
+    /// The moves, the last of which lifts to safe Z.
+    pub(super) fn into_moves(mut self) -> Vec<Move> {
+        if let Some(last) = self.moves.last() {
+            let at = last.to;
+            self.rapid(at, at.with_z(self.job.safe_z_mm));
+        }
         self.moves
     }
 
-    /// Goes to the start of the chain at safe Z, enters, cuts, retracts. `wood_mm`: the highest wood under the
-    /// cutter at the start. A chain without room to ramp is only counted.
-    pub(super) fn chain(&mut self, chain: &[DVec3], wood_mm: f64) {
-        let ramp_z =
-            (wood_mm + RAMP_GAP_MM).max(chain[0].z).min(self.job.safe_z_mm.max(chain[0].z));
+    /// Goes to the start of the chain, enters and cuts; the tool stays down. `wood_mm`: the height of the tip at which the
+    /// cutter touches wood at the start; `travel`: over the wood as it is. A chain without room to ramp is only counted.
+    pub(super) fn chain(&mut self, chain: &[DVec3], wood_mm: f64, travel: &Travel) {
+        let safe_z_mm = self.job.safe_z_mm;
+        let ramp_z = (wood_mm + RAMP_GAP_MM).max(chain[0].z).min(safe_z_mm.max(chain[0].z));
         let Some(entry) = ramp_onto(chain, ramp_z, libm::tan(self.job.ramp_rad)) else {
             self.skipped += 1;
             return;
         };
-        let above = on_program_grid(entry[0].with_z(self.job.safe_z_mm));
-        match self.moves.last() {
-            Some(last) => self.rapid(last.to, above),
-            None => self.moves.reserve(chain.len()),
+        let mut above = on_program_grid(entry[0].with_z(safe_z_mm));
+        if let Some(last) = self.moves.last() {
+            let from = last.to;
+            let height_mm = travel.height_mm(from.truncate(), above.truncate());
+            above = on_program_grid(above.with_z(height_mm.max(from.z)));
+            let lifted = from.with_z(above.z);
+            self.rapid(from, lifted);
+            self.rapid(lifted, above);
+        } else {
+            self.moves.reserve(chain.len());
         }
         let low = (wood_mm.max(chain[0].z) + self.job.clearance_mm).min(above.z);
         let low = on_program_grid(above.with_z(low));
@@ -73,7 +87,6 @@ impl<'a> Emitter<'a> {
         for &p in entry.iter().chain(&chain[1..]) {
             at = self.feed(at, on_program_grid(p));
         }
-        self.rapid(at, at.with_z(above.z));
     }
 
     fn rapid(&mut self, from: DVec3, to: DVec3) {
@@ -110,17 +123,6 @@ fn feed(way: DVec3, operation: &Operation, machine: &Machine) -> f64 {
     let step = if most > 200.0 { 10.0 } else { 1.0 };
     let whole = ((most + 1e-9) / step).floor() * step;
     if whole > 0.0 { whole } else { most }
-}
-
-/// Time to lift at `a`, travel and come down to `b` and ramp in again, s; accelerations left out.
-pub(super) fn lift_seconds(job: &Job, operation: &Operation, a: DVec3, b: DVec3) -> f64 {
-    let rate = job.machine.max_rate_mm_per_min;
-    let vertical = (job.safe_z_mm - a.z).max(0.0) + (job.safe_z_mm - b.z).max(0.0);
-    let across: DVec2 = (b - a).truncate();
-    let ramp = (job.clearance_mm + RAMP_GAP_MM) / libm::tan(job.ramp_rad);
-    60.0 * (vertical / rate.z
-        + across.length() / rate.x.min(rate.y)
-        + ramp / operation.feed_mm_per_min)
 }
 
 /// Time to feed along points, s; the limits on steep pieces left out.

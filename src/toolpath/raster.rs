@@ -7,11 +7,13 @@
 //! not fit into, or no roughing at all), the finishing cutter first takes it down in ramped levels of its own.
 
 use super::chain::{Span, chains};
-use super::emit::{Emitter, feed_seconds, lift_seconds};
+use super::emit::{Emitter, feed_seconds};
 use super::fit::fit;
+use super::order::{Direction, in_order};
 use super::rough::{Rough, rough};
 use super::rows::{Row, rim, rows, slanted_rim};
 use super::trace::{LEAST_ROUNDING_MM, Sample, Tracer};
+use super::travel::Travel;
 use super::{Site, ToolpathError};
 use crate::cutter::Profile;
 use crate::geom::{DVec2, DVec3};
@@ -117,6 +119,7 @@ pub(super) fn passes(
     let tracer = Tracer::new(|p: DVec2| dropper.drop(p), rolled, pitch, fit_mm);
     site.refuse_endless(cut.angle_rad, cut.stepover_mm, tracer.spacing_mm())?;
 
+    let travel = Travel::new(site.job, site.operation, block);
     let bounds = site.job.stock.bounds();
     let mut rows = rows(&bounds, cut.angle_rad, cut.stepover_mm);
     rows.extend(match cut.only {
@@ -125,14 +128,15 @@ pub(super) fn passes(
         Some(_) => rim(&bounds),
     });
     let spans: Vec<Vec<Span>> =
-        rows.into_par_iter().map(|row| row_spans(site, cut, &row, &tracer)).collect();
+        rows.into_par_iter().map(|row| row_spans(site, &travel, cut, &row, &tracer)).collect();
     let deepest_mm = deepest_pass_mm(&spans, block, site.operation.cutter.working_mm());
-    let link = |done: &[DVec3], next: &[DVec3]| link(site, &tracer, done, next);
+    let link = |done: &[DVec3], next: &[DVec3]| link(site, &travel, &tracer, done, next);
     let first = out.moves().len();
-    for chain in chains(spans, link) {
+    let chains = chains(spans, Direction::Both, link);
+    for chain in in_order(chains, Direction::Both, out.at()) {
         // Where the cutter would touch the wood: a high wall beside it does not count.
         let touch_mm = wood.drop(chain[0].truncate());
-        out.chain(&chain, touch_mm);
+        out.chain(&chain, touch_mm, &travel);
     }
     Ok(Passed { first, deepest_mm })
 }
@@ -141,13 +145,14 @@ pub(super) fn passes(
 /// `None` where lifting is quicker.
 pub(super) fn link(
     site: &Site,
+    travel: &Travel,
     tracer: &Tracer<impl Fn(DVec2) -> f64>,
     done: &[DVec3],
     next: &[DVec3],
 ) -> Option<Vec<DVec3>> {
     let (a, b) = (done[done.len() - 1], next[0]);
     let seconds = |way: &[DVec3]| feed_seconds(site.operation, way);
-    let (straight, lift) = (seconds(&[a, b]), lift_seconds(site.job, site.operation, a, b));
+    let (straight, lift) = (seconds(&[a, b]), travel.lift_seconds(a, b));
     if straight > lift {
         return None;
     }
@@ -176,12 +181,13 @@ pub(super) fn link(
 /// The spans of a row with something to cut. Where only some places are asked for, nothing else is computed.
 fn row_spans(
     site: &Site,
+    travel: &Travel,
     cut: &Passes,
     row: &Row,
     tracer: &Tracer<impl Fn(DVec2) -> f64>,
 ) -> Vec<Span> {
     let Some(only) = cut.only else {
-        return spans(site, row, tracer.trace(row.from, row.to));
+        return spans(site, travel, row, tracer.trace(row.from, row.to));
     };
     let length = row.from.distance(row.to);
     let pitch = site.target.grid().pitch_mm;
@@ -283,12 +289,14 @@ fn over_the_top(path: &mut [Sample]) {
 
 /// The stretches of a row with something to cut, with room at both ends, fitted. Gaps that are quicker to cross at
 /// the stock's top than by lifting do not split.
-fn spans(site: &Site, row: &Row, mut path: Vec<Sample>) -> Vec<Span> {
+fn spans(site: &Site, travel: &Travel, row: &Row, mut path: Vec<Sample>) -> Vec<Span> {
     let mut stretches: Vec<(usize, usize)> = Vec::new();
     for (k, p) in path.iter().enumerate() {
         if p.z <= TOP_MM {
             match stretches.last_mut() {
-                Some((_, to)) if *to + 1 == k || crosses(site, row, &path[*to], p) => *to = k,
+                Some((_, to)) if *to + 1 == k || crosses(site, travel, row, &path[*to], p) => {
+                    *to = k;
+                }
                 _ => stretches.push((k, k)),
             }
         }
@@ -307,9 +315,9 @@ fn spans(site: &Site, row: &Row, mut path: Vec<Sample>) -> Vec<Span> {
 }
 
 /// True when going on along the row from `a` to `b` is quicker than lifting.
-fn crosses(site: &Site, row: &Row, a: &Sample, b: &Sample) -> bool {
+fn crosses(site: &Site, travel: &Travel, row: &Row, a: &Sample, b: &Sample) -> bool {
     let ends = points(row, &[*a, *b]);
-    feed_seconds(site.operation, &ends) <= lift_seconds(site.job, site.operation, ends[0], ends[1])
+    feed_seconds(site.operation, &ends) <= travel.lift_seconds(ends[0], ends[1])
 }
 
 /// Samples of a row as points in space.

@@ -1,9 +1,11 @@
 //! Roughing: levels of constant Z, parallel passes on each, never inside the allowance.
 
 use super::chain::{Span, chains};
-use super::emit::{Emitter, feed_seconds, lift_seconds};
+use super::emit::{Emitter, feed_seconds};
+use super::order::{Direction, in_order};
 use super::rows::{Row, rows};
 use super::trace::{DROP_MM, LEAST_ROUNDING_MM, Sample, Tracer};
+use super::travel::Travel;
 use super::{Site, ToolpathError};
 use crate::cutter::Profile;
 use crate::geom::{DVec2, DVec3};
@@ -109,20 +111,21 @@ pub(super) fn rough(
         for s in &surveys {
             by_row[s.number].extend(spans(s, z, cut, site.operation.cutter.diameter_mm));
         }
+        let travel = Travel::new(site.job, site.operation, block);
         let link = |done: &[DVec3], next: &[DVec3]| {
             let (a, b) = (done[done.len() - 1], next[0]);
             let direct = [a, b];
-            if feed_seconds(site.operation, &direct) > lift_seconds(site.job, site.operation, a, b)
-            {
+            if feed_seconds(site.operation, &direct) > travel.lift_seconds(a, b) {
                 return None;
             }
             let way = tracer.even(a.truncate(), b.truncate());
             way.iter().all(|p| is_allowed(p, z)).then(Vec::new)
         };
         let before = out.moves().len();
-        for chain in chains(by_row, link) {
+        let chains = chains(by_row, Direction::Both, link);
+        for chain in in_order(chains, Direction::Both, out.at()) {
             let wood = block.highest_under(profile.radius_mm(), chain[0].truncate());
-            out.chain(&chain, wood);
+            out.chain(&chain, wood, &travel);
         }
         if k < levels || site.later || cut.only_deeper_than_mm > 0.0 {
             block.cut(&profile, &out.moves()[before..]);

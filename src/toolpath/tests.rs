@@ -272,8 +272,8 @@ fn assert_entries_are_ramped(path: &Toolpath, job: &Job, wood: &mut Heightfield)
     let mut entering = false;
     for m in &path.moves {
         if m.is_rapid() {
-            entering = m.to.z < m.from.z;
-            assert!(!entering || !gouges(wood, &profile, m.to, 0.0), "rapid into wood at {}", m.to);
+            entering = true;
+            assert!(!gouges(wood, &profile, m.to, 0.0), "rapid into wood at {}", m.to);
         } else if m.from.truncate() == m.to.truncate() && m.to.z < m.from.z {
             assert!(entering && !gouges(wood, &profile, m.to, 0.0), "straight down at {}", m.to);
         } else if entering {
@@ -456,13 +456,14 @@ fn broken_paths_are_found_out() {
     let feed = |speed| crate::geom::MoveKind::Feed { feed_mm_per_min: speed };
     let down = good.moves.iter().position(|m| !m.is_rapid() && m.to.z < m.from.z).unwrap();
     let across = good.moves.iter().position(|m| !m.is_rapid() && m.to.x != m.from.x).unwrap();
+    let slanted = good.moves.iter().position(|m| m.to.z < m.from.z && m.to.x != m.from.x).unwrap();
     assert!(matches!(broken(&Vec::clear), PathFault::Empty { .. }));
     assert!(matches!(broken(&|m| _ = m.remove(3)), PathFault::Gap { index: 3, .. }));
     assert!(matches!(broken(&|m| _ = m.pop()), PathFault::EndsLow { .. }));
     assert!(matches!(broken(&|m| m[down].kind = feed(5000.0)), PathFault::Plunge { .. }));
     assert!(matches!(broken(&|m| m[down].kind = feed(0.0)), PathFault::BadFeed { .. }));
     assert!(matches!(
-        broken(&|m| m[across].kind = crate::geom::MoveKind::Rapid),
+        broken(&|m| m[slanted].kind = crate::geom::MoveKind::Rapid),
         PathFault::LowRapid { .. }
     ));
     assert!(matches!(broken(&|m| m[across].to.y = f64::NAN), PathFault::NotFinite { .. }));

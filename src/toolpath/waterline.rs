@@ -10,8 +10,10 @@ use super::Site;
 use super::chain::{Span, chains};
 use super::emit::Emitter;
 use super::left::{Left, Surfaces};
+use super::order::{Direction, in_order};
 use super::raster::{TOP_MM, link};
 use super::trace::{DROP_MM, LEAST_ROUNDING_MM, Tracer};
+use super::travel::Travel;
 use crate::cutter::Profile;
 use crate::geom::{DVec2, DVec3, Grid, Heightfield};
 use crate::offset::Dropper;
@@ -90,11 +92,13 @@ pub(super) fn waterlines(site: &Site, lines: &Waterlines, block: &mut Block, out
             continue;
         }
         let wood = Dropper::new(block.field(), profile.clone());
-        let link = |done: &[DVec3], next: &[DVec3]| link(site, &tracer, done, next);
+        let travel = Travel::new(site.job, site.operation, block);
+        let link = |done: &[DVec3], next: &[DVec3]| link(site, &travel, &tracer, done, next);
         let before = out.moves().len();
-        for chain in chains(nearest_first(spans), link) {
+        let chains = chains(nearest_first(spans), Direction::Fixed, link);
+        for chain in in_order(chains, Direction::Fixed, out.at()) {
             let touch_mm = wood.drop(chain[0].truncate());
-            out.chain(&chain, touch_mm);
+            out.chain(&chain, touch_mm, &travel);
         }
         block.cut(&profile, &out.moves()[before..]);
         // The flank may have cleared the walls above.

@@ -1,0 +1,61 @@
+//! Travel between cuts: how high a rapid must go, and what lifting costs.
+//!
+//! ```text
+//!   safe Z      ........ over ground that no cutter has been on yet: clamps may stand there
+//!   clearance       ___________
+//!                  |           |      over carved ground: the highest wood that lies in the way, and the gap
+//!        __________|           |____
+//! ```
+
+use crate::geom::{DVec2, DVec3};
+use crate::job::{Job, Operation};
+use crate::stock::Block;
+
+/// Gap above the wood where a ramp begins; down to it the cutter feeds straight through air, mm.
+pub(super) const RAMP_GAP_MM: f64 = 0.2;
+/// Ground counts as carved where the wood stands at least this far below the stock's top, mm.
+const CARVED_MM: f64 = 0.02;
+/// Room beside the cutter on its way, mm.
+const BESIDE_MM: f64 = 0.5;
+/// A travel that saves less than this against safe Z goes at safe Z, mm.
+const WORTH_MM: f64 = 0.5;
+
+/// Travel over the wood as it is.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Travel<'a> {
+    job: &'a Job,
+    operation: &'a Operation,
+    wood: &'a Block,
+}
+
+impl<'a> Travel<'a> {
+    pub(super) fn new(job: &'a Job, operation: &'a Operation, wood: &'a Block) -> Self {
+        Self { job, operation, wood }
+    }
+
+    /// The height at which a rapid may go straight from above `a` to above `b`, mm: `clearance_mm` above the wood under
+    /// the cutter and its shank, where all of it has been carved; else safe Z.
+    pub(super) fn height_mm(&self, a: DVec2, b: DVec2) -> f64 {
+        let cutter = &self.operation.cutter;
+        let mut radius_mm = 0.5 * cutter.diameter_mm.max(cutter.shank_mm);
+        if self.job.stock.thickness_mm > cutter.stickout_mm {
+            radius_mm = radius_mm.max(0.5 * cutter.holder_mm);
+        }
+        let safe_z_mm = self.job.safe_z_mm;
+        let wood_mm = self.wood.highest_along(radius_mm + BESIDE_MM, a, b);
+        let low_mm = wood_mm + self.job.clearance_mm;
+        if wood_mm > -CARVED_MM || low_mm > safe_z_mm - WORTH_MM { safe_z_mm } else { low_mm }
+    }
+
+    /// Time to lift at `a`, travel and come down to `b` and ramp in again, s; accelerations left out.
+    pub(super) fn lift_seconds(&self, a: DVec3, b: DVec3) -> f64 {
+        let rate = self.job.machine.max_rate_mm_per_min;
+        let across: DVec2 = (b - a).truncate();
+        let height_mm = self.height_mm(a.truncate(), b.truncate());
+        let vertical = (height_mm - a.z).max(0.0) + (height_mm - b.z).max(0.0);
+        let ramp = (self.job.clearance_mm + RAMP_GAP_MM) / libm::tan(self.job.ramp_rad);
+        60.0 * (vertical / rate.z
+            + across.length() / rate.x.min(rate.y)
+            + ramp / self.operation.feed_mm_per_min)
+    }
+}
