@@ -10,11 +10,15 @@
 
 mod chain;
 mod check;
+mod clearance;
+mod contours;
 mod emit;
 mod finish;
 mod fit;
 mod left;
+mod levels;
 mod order;
+mod pocket;
 mod ramp;
 mod raster;
 mod rough;
@@ -31,10 +35,12 @@ mod tests;
 pub use check::PathFault;
 
 use crate::geom::{Heightfield, Move, MoveKind};
-use crate::job::{CutterSpec, Job, Operation, OperationKind};
+use crate::job::{CutterSpec, Job, Operation, OperationKind, Pattern};
 use crate::stock::Block;
 use emit::Emitter;
+use pocket::Pockets;
 use rough::Rough;
+use waterline::Contour;
 
 /// The moves of one program: one cutter, one or more operations.
 #[derive(Debug, Clone, PartialEq)]
@@ -151,6 +157,17 @@ struct Site<'a> {
 }
 
 impl Site<'_> {
+    /// Distance of passes on level ground that leaves cusps of `scallop_mm`, mm.
+    fn stepover_of(&self, scallop_mm: f64) -> Result<f64, ToolpathError> {
+        let cutter = &self.operation.cutter;
+        raster::stepover_of_scallop(cutter, scallop_mm).ok_or_else(|| {
+            ToolpathError::ScallopWithoutBall {
+                operation: self.number,
+                cutter: cutter.name.clone(),
+            }
+        })
+    }
+
     /// Refuses passes so close that they would fill the memory.
     fn refuse_endless(
         &self,
@@ -183,8 +200,18 @@ pub fn plan(
     target: &Heightfield,
     observe: &mut dyn FnMut(PlanEvent),
 ) -> Result<Vec<Toolpath>, ToolpathError> {
+    plan_from(job, target, &mut Block::new(&job.stock, *target.grid()), observe)
+}
+
+/// [`plan`] on wood that is carved already; `block` follows, but for what the last operation takes.
+fn plan_from(
+    job: &Job,
+    target: &Heightfield,
+    block: &mut Block,
+    observe: &mut dyn FnMut(PlanEvent),
+) -> Result<Vec<Toolpath>, ToolpathError> {
     check_target(job, target)?;
-    let mut block = Block::new(&job.stock, *target.grid());
+    let fresh = block.field().range().is_some_and(|(low, _)| low == 0.0);
     let mut paths: Vec<Toolpath> = Vec::new();
     let total = job.operations.len();
     for (index, operation) in job.operations.iter().enumerate() {
@@ -193,7 +220,7 @@ pub fn plan(
             target,
             operation,
             number: index + 1,
-            fresh: paths.is_empty(),
+            fresh: fresh && paths.is_empty(),
             later: index + 1 < total,
         };
         let kind = kind_name(operation);
@@ -201,22 +228,41 @@ pub fn plan(
         observe(PlanEvent::Operation { number: site.number, total, kind, cutter });
         let mut out = Emitter::new(job, operation);
         match operation.kind {
-            OperationKind::Rough { leave_mm, stepdown_mm, stepover_mm, angle_rad } => {
-                let cut = Rough {
-                    leave_mm,
-                    stepdown_mm,
-                    stepover_mm,
-                    angle_rad,
-                    only_deeper_than_mm: 0.0,
-                    shortest_mm: SHORTEST_SPAN_PER_DIAMETER * operation.cutter.diameter_mm,
-                };
-                rough::rough(&site, &cut, &mut block, &mut out)?;
+            OperationKind::Rough { leave_mm, stepdown_mm, stepover_mm, pattern } => {
+                let only_deeper_than_mm = terrace_mm(&job.operations[..index]);
+                match pattern {
+                    Pattern::Contour { milling } => {
+                        let cut = Pockets {
+                            leave_mm,
+                            stepdown_mm,
+                            stepover_mm,
+                            milling,
+                            only_deeper_than_mm,
+                        };
+                        pocket::pockets(&site, &cut, block, &mut out)?;
+                    }
+                    Pattern::Raster { angle_rad } => {
+                        let cut = Rough {
+                            leave_mm,
+                            stepdown_mm,
+                            stepover_mm,
+                            angle_rad,
+                            only_deeper_than_mm,
+                            shortest_mm: SHORTEST_SPAN_PER_DIAMETER * operation.cutter.diameter_mm,
+                        };
+                        rough::rough(&site, &cut, block, &mut out)?;
+                    }
+                }
             }
             OperationKind::Raster { stepover, angle_rad } => {
-                raster::raster(&site, stepover, angle_rad, &mut block, &mut out)?;
+                raster::raster(&site, stepover, angle_rad, block, &mut out)?;
+            }
+            OperationKind::Contour { scallop_mm, steeper_than_rad, milling } => {
+                let cut = Contour { scallop_mm, steeper_than_rad, milling };
+                waterline::contour(&site, &cut, block, &mut out)?;
             }
             OperationKind::Finish { scallop_mm, angle_rad } => {
-                finish::finish(&site, scallop_mm, angle_rad, &mut block, &mut out)?;
+                finish::finish(&site, scallop_mm, angle_rad, block, &mut out)?;
             }
         }
         for note in notes(&site, &out) {
@@ -250,11 +296,20 @@ fn check_target(job: &Job, target: &Heightfield) -> Result<(), ToolpathError> {
     Err(ToolpathError::TargetOutsideStock { lowest_mm, highest_mm, bottom_mm })
 }
 
+/// Steps that earlier roughing leaves on slopes, mm: what stands no higher than that is no wood that it could not reach.
+fn terrace_mm(earlier: &[Operation]) -> f64 {
+    let step = |o: &Operation| match o.kind {
+        OperationKind::Rough { stepdown_mm, .. } => stepdown_mm,
+        _ => 0.0,
+    };
+    earlier.iter().map(step).fold(0.0, f64::max)
+}
+
 /// What an operation does, in a file name.
 fn kind_name(operation: &Operation) -> &'static str {
     match operation.kind {
         OperationKind::Rough { .. } => "rough",
-        OperationKind::Raster { .. } | OperationKind::Finish { .. } => "finish",
+        _ => "finish",
     }
 }
 

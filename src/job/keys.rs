@@ -108,6 +108,8 @@ pub(super) mod rule {
     pub(in crate::job) const CUTTERS: (&str, &str) = ("flat-6", "ball-3");
     /// Distance of roughing passes as a fraction of the cutter's diameter.
     pub(in crate::job) const ROUGH_STEPOVER: f64 = 0.4;
+    /// Widest distance of roughing rings as a fraction of the diameter: corners of rings lie sqrt(2) further apart.
+    pub(in crate::job) const RING_STEPOVER: f64 = 0.7;
     /// Distance of finishing passes of a flat cutter, which leaves no cusps, as a fraction of its diameter.
     pub(in crate::job) const FLAT_STEPOVER: f64 = 0.1;
     /// Spindle speed wanted when the job gives none, 1/min.
@@ -145,7 +147,11 @@ pub(super) const SPLITS: &[&str] = &["sleeves", "teddy"];
 /// Names of [`super::Join`], in its order.
 pub(super) const JOINS: &[&str] = &["clusters", "pairs"];
 /// Kinds of operation that there are.
-pub(super) const OPERATIONS: &[&str] = &["rough", "finish", "raster"];
+pub(super) const OPERATIONS: &[&str] = &["rough", "finish", "raster", "contour"];
+/// Ways of [`super::Pattern`], in its order.
+pub(super) const PATTERNS: &[&str] = &["contour", "raster"];
+/// Names of [`super::Milling`], in its order.
+pub(super) const MILLINGS: &[&str] = &["climb", "conventional"];
 
 const LENGTH: f64 = 10_000.0;
 
@@ -555,16 +561,16 @@ pub(super) static OPERATION: Section = Section {
     keys: &[
         key(
             "kind",
-            Kind::Forms("\"rough\", \"finish\" or \"raster\""),
+            Kind::Forms("\"rough\", \"finish\", \"raster\" or \"contour\""),
             Required,
-            "rough: remove the bulk in levels; finish: passes that hold the scallop on every slope; raster: parallel passes",
+            "rough: remove the bulk in levels; finish: passes that hold the scallop on every slope; raster: parallel passes; contour: waterlines",
         ),
         key(
             "cutter",
             Kind::Forms(
                 "a name (`relievo cutters` lists them) or a table { shape = \"ball\", diameter_mm = 3, ... }",
             ),
-            Rule("rough: flat-6, finish and raster: ball-3"),
+            Rule("rough: flat-6, others: ball-3"),
             "a name from `relievo cutters`, or a table as in machines/cutters.toml",
         ),
         key("leave_mm", mm(0.0, 20.0), Number(0.5), "rough: wood left on the relief"),
@@ -584,13 +590,31 @@ pub(super) static OPERATION: Section = Section {
             "scallop_mm",
             mm(0.0005, 1.0),
             Rule("tolerance.scallop_mm"),
-            "finish and raster, ball cutters: height of the cusps; in raster instead of stepover_mm",
+            "finish, raster and contour, ball cutters: height of the cusps; in raster instead of stepover_mm",
+        ),
+        key(
+            "pattern",
+            Kind::Choice(PATTERNS),
+            Text("contour"),
+            "rough: rings that keep their distance from the walls (contour), or parallel passes (raster)",
+        ),
+        key(
+            "milling",
+            Kind::Choice(MILLINGS),
+            Text("climb"),
+            "contour, and rough in rings: which side of its way the cutter meets the wood on",
+        ),
+        key(
+            "steeper_than_deg",
+            deg(1.0, 89.0),
+            Number(30.0),
+            "contour: flatter ground is left to other operations",
         ),
         key(
             "angle_deg",
             deg(-360.0, 360.0),
             Rule("along the grain"),
-            "direction of the passes, from the X axis",
+            "finish, raster, and rough in parallel passes: their direction, from the X axis",
         ),
         key(
             "feed_mm_per_min",

@@ -5,12 +5,14 @@ use toml::de::{DeTable, DeValue};
 use super::cutter::read_cutter;
 use super::draft::{Draft, text_or_form};
 use super::error::{JobError, Source};
-use super::keys::{CUTTER, OPERATION, OPERATIONS, rule};
+use super::keys::{CUTTER, OPERATION, OPERATIONS, PATTERNS, rule};
 use super::library::Library;
 use super::reader::Table;
 use super::settle::round;
 use super::speeds::{self, Speeds, Wanted};
-use super::types::{CutterShape, CutterSpec, Operation, OperationKind, Stepover, Stock};
+use super::types::{
+    CutterShape, CutterSpec, Milling, Operation, OperationKind, Pattern, Stepover, Stock,
+};
 
 /// An operation whose numbers may still be open.
 #[derive(Debug, Clone, PartialEq)]
@@ -22,6 +24,10 @@ pub(super) struct OperationDraft {
     pub(super) stepover_mm: Option<f64>,
     pub(super) scallop_mm: Option<f64>,
     pub(super) angle_rad: Option<f64>,
+    /// Index of a word of [`PATTERNS`].
+    pub(super) pattern: usize,
+    pub(super) milling: Milling,
+    pub(super) steeper_than_rad: f64,
     pub(super) feed_mm_per_min: Option<f64>,
     pub(super) plunge_mm_per_min: Option<f64>,
     pub(super) spindle_rpm: Option<f64>,
@@ -33,6 +39,7 @@ pub(super) enum KindDraft {
     Rough,
     Finish,
     Raster,
+    Contour,
 }
 
 /// The operations of a job that names none: rough, then finish.
@@ -57,16 +64,29 @@ pub(super) fn read_operation(
     let kind = match OPERATIONS.iter().position(|name| *name == word) {
         Some(0) => KindDraft::Rough,
         Some(1) => KindDraft::Finish,
-        Some(_) => KindDraft::Raster,
+        Some(2) => KindDraft::Raster,
+        Some(_) => KindDraft::Contour,
         None => return Err(table.unknown_word("kind", "kind of operation", word, OPERATIONS)),
     };
     let foreign: &[&str] = match kind {
-        KindDraft::Rough => &["scallop_mm"],
-        KindDraft::Finish => &["leave_mm", "stepdown_mm", "stepover_mm"],
-        KindDraft::Raster => &["leave_mm", "stepdown_mm"],
+        KindDraft::Rough if table.choice("pattern") == 0 => {
+            &["scallop_mm", "steeper_than_deg", "angle_deg"]
+        }
+        KindDraft::Rough => &["scallop_mm", "steeper_than_deg", "milling"],
+        KindDraft::Finish => {
+            &["leave_mm", "stepdown_mm", "stepover_mm", "pattern", "milling", "steeper_than_deg"]
+        }
+        KindDraft::Raster => &["leave_mm", "stepdown_mm", "pattern", "milling", "steeper_than_deg"],
+        KindDraft::Contour => &["leave_mm", "stepdown_mm", "stepover_mm", "pattern", "angle_deg"],
     };
     if let Some(name) = foreign.iter().find(|name| table.raw(name).is_some()) {
-        let message = format!("`{name}` means nothing to a {word} operation");
+        let whose = match kind {
+            KindDraft::Rough => {
+                format!("{word} operation in {} passes", PATTERNS[table.choice("pattern")])
+            }
+            _ => format!("{word} operation"),
+        };
+        let message = format!("`{name}` means nothing to a {whose}");
         let doc = table.section.key(name).map_or("", |key| key.doc);
         return Err(table.impossible(
             name,
@@ -81,7 +101,7 @@ pub(super) fn read_operation(
         return Err(table.impossible("stepover_mm", message, "", "keep one of the two"));
     }
     let word = draft.cutter.shape.word();
-    if kind == KindDraft::Finish && draft.cutter.ball_mm().is_none() {
+    if matches!(kind, KindDraft::Finish | KindDraft::Contour) && draft.cutter.ball_mm().is_none() {
         let message = format!("a {word} cutter ({}) cannot finish slopes", draft.cutter.name);
         let help = "take a ball or tapered cutter, or kind = \"raster\" with stepover_mm";
         return Err(table.impossible("cutter", &message, "", help));
@@ -106,7 +126,7 @@ fn operation(
 ) -> Result<OperationDraft, JobError> {
     let default_cutter = match kind {
         KindDraft::Rough => rule::CUTTERS.0,
-        KindDraft::Finish | KindDraft::Raster => rule::CUTTERS.1,
+        _ => rule::CUTTERS.1,
     };
     Ok(OperationDraft {
         kind,
@@ -115,6 +135,9 @@ fn operation(
         stepdown_mm: table.number("stepdown_mm"),
         stepover_mm: table.number("stepover_mm"),
         scallop_mm: table.number("scallop_mm"),
+        pattern: table.choice("pattern"),
+        milling: [Milling::Climb, Milling::Conventional][table.choice("milling")],
+        steeper_than_rad: table.sure_number("steeper_than_deg").to_radians(),
         angle_rad: table.number("angle_deg").map(f64::to_radians),
         feed_mm_per_min: table.number("feed_mm_per_min"),
         plunge_mm_per_min: table.number("plunge_mm_per_min"),
@@ -268,6 +291,13 @@ impl Step<'_> {
                 format!("passes further apart than the cutter is wide ({diameter} mm) leave ribs");
             return self.refuse(&["stepover_mm"], &message, &format!("give {diameter} or less"));
         }
+        let widest = rule::RING_STEPOVER * diameter;
+        let rings = draft.kind == KindDraft::Rough && PATTERNS[draft.pattern] == "contour";
+        if rings && draft.stepover_mm.is_some_and(|stepover| stepover > widest) {
+            let message = format!("rings further apart than {widest:.3} mm leave ribs in corners");
+            let help = "give less, or pattern = \"raster\"";
+            return self.refuse(&["stepover_mm"], &message, help);
+        }
         let angle_rad = draft.angle_rad.unwrap_or(self.stock.grain_rad);
         Ok(match draft.kind {
             KindDraft::Rough => OperationKind::Rough {
@@ -278,7 +308,15 @@ impl Step<'_> {
                     None if self.is_pointed() => return self.lacks_stepover(),
                     None => round(rule::ROUGH_STEPOVER * draft.cutter.working_mm()),
                 },
-                angle_rad,
+                pattern: match PATTERNS[draft.pattern] {
+                    "raster" => Pattern::Raster { angle_rad },
+                    _ => Pattern::Contour { milling: draft.milling },
+                },
+            },
+            KindDraft::Contour => OperationKind::Contour {
+                scallop_mm: self.scallop_mm()?,
+                steeper_than_rad: draft.steeper_than_rad,
+                milling: draft.milling,
             },
             KindDraft::Finish => {
                 OperationKind::Finish { scallop_mm: self.scallop_mm()?, angle_rad }

@@ -146,7 +146,7 @@ impl Draft {
                 // Roughing keeps its allowance from both walls of the moat.
                 let needs = |op: &OperationDraft| match op.kind {
                     KindDraft::Rough => op.cutter.diameter_mm + 2.0 * op.leave_mm,
-                    KindDraft::Finish | KindDraft::Raster => op.cutter.diameter_mm,
+                    _ => op.cutter.diameter_mm,
                 };
                 let widest = self.operations.iter().map(needs).fold(0.0, f64::max);
                 Background::Leave(widest + rule::LEAVE_EXTRA_MM)

@@ -154,7 +154,7 @@ fn the_whole_example_is_read() {
         leave_mm: 0.7,
         stepdown_mm: 1.5,
         stepover_mm: 2.4,
-        angle_rad: std::f64::consts::FRAC_PI_2,
+        pattern: Pattern::Contour { milling: Milling::Climb },
     };
     assert_eq!(job.operations[0].kind, rough);
     let raster = OperationKind::Raster {

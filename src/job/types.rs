@@ -497,8 +497,17 @@ pub enum OperationKind {
         stepdown_mm: f64,
         /// Distance of passes, mm.
         stepover_mm: f64,
-        /// Direction of the passes from the x axis, radians.
-        angle_rad: f64,
+        /// How a level is cleared.
+        pattern: Pattern,
+    },
+    /// Waterlines: the cutter goes round steep ground at constant Z, from the top down.
+    Contour {
+        /// Height of the cusps, mm.
+        scallop_mm: f64,
+        /// Ground flatter than this is left to other operations, radians from the level.
+        steeper_than_rad: f64,
+        /// Side of the wood.
+        milling: Milling,
     },
     /// Passes that leave no more than a scallop height on any slope: parallel ones over everything, then passes
     /// across wherever those left more.
@@ -515,6 +524,32 @@ pub enum OperationKind {
         /// Direction of the passes from the x axis, radians.
         angle_rad: f64,
     },
+}
+
+/// How roughing clears a level.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Pattern {
+    /// Rings that keep their distance from walls and rim (contour-parallel), from the inside out.
+    Contour {
+        /// Side of the wood.
+        milling: Milling,
+    },
+    /// Parallel passes, to and fro.
+    Raster {
+        /// Direction of the passes from the x axis, radians.
+        angle_rad: f64,
+    },
+}
+
+/// On which side of its way the cutter, which turns clockwise, meets the wood.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Milling {
+    /// Wood on the right: chips begin thick.
+    Climb,
+    /// Wood on the left: chips begin thin.
+    Conventional,
 }
 
 /// How far apart finishing passes lie.

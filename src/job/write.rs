@@ -5,14 +5,14 @@ use std::fmt::Write as _;
 use super::draft::Draft;
 use super::error::JobError;
 use super::keys::{
-    ARTWORK, BACKGROUND, COMBINES, CUTTER, Fallback, JOB, JOINS, LAYER, MACHINE, OPERATION,
-    ORIGINS, PROFILES, PRUNES, RELIEF, SAFETY, SPLITS, STOCK, SURFACE, Section, TOLERANCE, TOP,
-    WOOD, rule,
+    ARTWORK, BACKGROUND, COMBINES, CUTTER, Fallback, JOB, JOINS, LAYER, MACHINE, MILLINGS,
+    OPERATION, ORIGINS, PATTERNS, PROFILES, PRUNES, RELIEF, SAFETY, SPLITS, STOCK, SURFACE,
+    Section, TOLERANCE, TOP, WOOD, rule,
 };
 use super::library::Library;
 use super::types::{
-    Background, CutterShape, CutterSpec, Fit, Found, Job, LayerSpec, Machine, Operation,
-    OperationKind, Place, Prune, SkeletonSpec, Stepover, SurfaceSpec, Wood,
+    Background, CutterShape, CutterSpec, Fit, Found, Job, LayerSpec, Machine, Milling, Operation,
+    OperationKind, Pattern, Place, Prune, SkeletonSpec, Stepover, SurfaceSpec, Wood,
 };
 use crate::geom::{DVec2, DVec3};
 
@@ -345,28 +345,39 @@ fn layer_lines(layer: &LayerSpec) -> Vec<Line> {
 
 /// All but the cutter, which is a name here and a table there.
 fn operation_lines(operation: &Operation) -> Vec<Line> {
-    let (kind, mut lines, angle_rad) = match operation.kind {
-        OperationKind::Rough { leave_mm, stepdown_mm, stepover_mm, angle_rad } => {
-            let lines = vec![
+    let angle = |rad: f64| ("angle_deg", degrees(rad));
+    let side = |milling: Milling| ("milling", quoted(MILLINGS[milling as usize]));
+    let (kind, mut lines) = match operation.kind {
+        OperationKind::Rough { leave_mm, stepdown_mm, stepover_mm, pattern } => {
+            let mut lines = vec![
                 ("leave_mm", number(leave_mm)),
                 ("stepdown_mm", number(stepdown_mm)),
                 ("stepover_mm", number(stepover_mm)),
             ];
-            ("rough", lines, angle_rad)
+            lines.extend(match pattern {
+                Pattern::Contour { milling } => [("pattern", quoted(PATTERNS[0])), side(milling)],
+                Pattern::Raster { angle_rad } => {
+                    [("pattern", quoted(PATTERNS[1])), angle(angle_rad)]
+                }
+            });
+            ("rough", lines)
         }
         OperationKind::Finish { scallop_mm, angle_rad } => {
-            ("finish", vec![("scallop_mm", number(scallop_mm))], angle_rad)
+            ("finish", vec![("scallop_mm", number(scallop_mm)), angle(angle_rad)])
         }
         OperationKind::Raster { stepover, angle_rad } => {
             let line = match stepover {
                 Stepover::Plan(stepover) => ("stepover_mm", number(stepover)),
                 Stepover::Scallop(scallop) => ("scallop_mm", number(scallop)),
             };
-            ("raster", vec![line], angle_rad)
+            ("raster", vec![line, angle(angle_rad)])
+        }
+        OperationKind::Contour { scallop_mm, steeper_than_rad, milling } => {
+            let steep = ("steeper_than_deg", degrees(steeper_than_rad));
+            ("contour", vec![("scallop_mm", number(scallop_mm)), steep, side(milling)])
         }
     };
     lines.insert(0, ("kind", quoted(kind)));
-    lines.push(("angle_deg", degrees(angle_rad)));
     lines.push(("feed_mm_per_min", number(operation.feed_mm_per_min)));
     lines.push(("plunge_mm_per_min", number(operation.plunge_mm_per_min)));
     lines.push(("spindle_rpm", number(operation.spindle_rpm)));

@@ -9,7 +9,7 @@
 
 use super::emit::Emitter;
 use super::left::Surfaces;
-use super::raster::{Passes, clear_deep_wood, passes, stepover_of_scallop};
+use super::raster::{Passes, clear_deep_wood, passes};
 use super::trace::LEAST_ROUNDING_MM;
 use super::waterline::{Waterlines, waterlines};
 use super::{Site, ToolpathError};
@@ -41,10 +41,7 @@ pub(super) fn finish(
     out: &mut Emitter,
 ) -> Result<(), ToolpathError> {
     let profile = Profile::of(&site.operation.cutter);
-    let stepover_mm = stepover_of_scallop(&site.operation.cutter, scallop_mm).ok_or_else(|| {
-        let cutter = site.operation.cutter.name.clone();
-        ToolpathError::ScallopWithoutBall { operation: site.number, cutter }
-    })?;
+    let stepover_mm = site.stepover_of(scallop_mm)?;
     clear_deep_wood(site, angle_rad, block, out)?;
     let all = Passes { stepover_mm, angle_rad, only: None };
     let done = passes(site, &all, block, out)?;
@@ -55,7 +52,13 @@ pub(super) fn finish(
     let reach = closing(&tip, &rolled);
     let limit_mm = scallop_mm + SPARE * site.job.tolerance.gouge_mm;
     let stepover_mm = FRAC_1_SQRT_2 * stepover_mm;
-    let lines = Waterlines { tip: &tip, reach: &reach, step_mm: stepover_mm, limit_mm };
+    let lines = Waterlines {
+        tip: &tip,
+        reach: &reach,
+        step_mm: stepover_mm,
+        limit_mm,
+        fit_mm: site.job.tolerance.fit_mm,
+    };
     waterlines(site, &lines, block, out);
     for (turn, closer) in TURNS {
         let surfaces = Surfaces { tip: &tip, reach: &reach, wood: block.field() };

@@ -3,8 +3,8 @@
 use crate::geom::{DVec2, DVec3, Grid, Heightfield, Tolerance};
 use crate::job::{
     ArtworkSpec, Background, Combine, CutterShape, CutterSpec, Fit, Job, LayerSpec, Machine,
-    Operation, OperationKind, Origin, Place, Profile, ReliefSpec, Selector, Stepover, Stock,
-    SurfaceSpec, Wood,
+    Milling, Operation, OperationKind, Origin, Pattern, Place, Profile, ReliefSpec, Selector,
+    Stepover, Stock, SurfaceSpec, Wood,
 };
 
 /// A job on a stock of this size with these operations and a shapeoko-like machine.
@@ -94,7 +94,12 @@ pub(crate) fn cutter(shape: CutterShape, diameter_mm: f64) -> CutterSpec {
 pub(crate) fn rough(cutter: CutterSpec, leave_mm: f64, stepdown_mm: f64) -> Operation {
     let stepover_mm = 0.4 * cutter.diameter_mm;
     Operation {
-        kind: OperationKind::Rough { leave_mm, stepdown_mm, stepover_mm, angle_rad: 0.0 },
+        kind: OperationKind::Rough {
+            leave_mm,
+            stepdown_mm,
+            stepover_mm,
+            pattern: Pattern::Contour { milling: Milling::Climb },
+        },
         cutter,
         feed_mm_per_min: 1500.0,
         plunge_mm_per_min: 375.0,
@@ -116,6 +121,13 @@ pub(crate) fn raster(cutter: CutterSpec, stepover: Stepover, angle_deg: f64) -> 
 /// A finishing operation with first passes along x.
 pub(crate) fn finish(cutter: CutterSpec, scallop_mm: f64) -> Operation {
     let kind = OperationKind::Finish { scallop_mm, angle_rad: 0.0 };
+    Operation { kind, ..raster(cutter, Stepover::Plan(1.0), 0.0) }
+}
+
+/// Waterlines on ground steeper than an angle.
+pub(crate) fn contour(cutter: CutterSpec, scallop_mm: f64, steeper_than_deg: f64) -> Operation {
+    let steeper_than_rad = steeper_than_deg.to_radians();
+    let kind = OperationKind::Contour { scallop_mm, steeper_than_rad, milling: Milling::Climb };
     Operation { kind, ..raster(cutter, Stepover::Plan(1.0), 0.0) }
 }
 

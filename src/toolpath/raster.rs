@@ -66,14 +66,7 @@ pub(super) fn raster(
     let profile = Profile::of(&site.operation.cutter);
     let stepover_mm = match stepover {
         Stepover::Plan(s) => s,
-        Stepover::Scallop(h) => {
-            stepover_of_scallop(&site.operation.cutter, h).ok_or_else(|| {
-                ToolpathError::ScallopWithoutBall {
-                    operation: site.number,
-                    cutter: site.operation.cutter.name.clone(),
-                }
-            })?
-        }
+        Stepover::Scallop(h) => site.stepover_of(h)?,
     };
     clear_deep_wood(site, angle_rad, block, out)?;
     let cut = Passes { stepover_mm, angle_rad, only: None };

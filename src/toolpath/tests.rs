@@ -1,12 +1,12 @@
 //! Laws of whole plans, held against brute force that shares no code with the planner.
 
 use super::fit::fit;
-use super::fixture::{Bump, cutter, finish, job, raster, relief, rough};
+use super::fixture::{Bump, contour, cutter, finish, job, raster, relief, rough};
 use super::trace::{Sample, Tracer};
 use super::*;
 use crate::cutter::Profile;
 use crate::geom::{DVec2, DVec3, Grid};
-use crate::job::{CutterShape, Stepover};
+use crate::job::{CutterShape, Pattern, Stepover};
 use crate::offset::Dropper;
 use proptest::prelude::*;
 
@@ -174,6 +174,14 @@ proptest! {
     }
 
     #[test]
+    fn a_contour_never_gouges(bumps in bumps(SIZE, 3.0), d in prop::sample::select(vec![1.0, 3.0]), steep in 10.0f64..60.0) {
+        let job = job(SIZE.x, SIZE.y, 10.0, 0.25, vec![contour(cutter(CutterShape::Ball, d), 0.02, steep)]);
+        let target = relief(&job, 3.0, 0.0, &bumps);
+        let Ok(paths) = plan(&job, &target, &mut |_| {}) else { return Ok(()) };
+        assert_no_gouge(&paths, &target);
+    }
+
+    #[test]
     fn a_finish_leaves_no_more_than_asked_wherever_the_cutter_reaches(bumps in bumps(SIZE, 3.0)) {
         assert_finished(&bumps);
     }
@@ -192,11 +200,11 @@ proptest! {
     #[test]
     fn roughing_stays_out_of_the_allowance(
         bumps in bumps(SIZE, 4.0), leave in 0.1f64..0.8, shape in prop::sample::select(vec![CutterShape::Flat, CutterShape::Ball]),
-        angle in prop::sample::select(vec![0.0, 30.0, 90.0]),
+        angle in prop::sample::select(vec![None, Some(0.0), Some(30.0), Some(90.0)]),
     ) {
         let mut op = rough(cutter(shape, 3.0), leave, 1.5);
-        if let OperationKind::Rough { angle_rad, .. } = &mut op.kind {
-            *angle_rad = f64::to_radians(angle);
+        if let (OperationKind::Rough { pattern, .. }, Some(angle)) = (&mut op.kind, angle) {
+            *pattern = Pattern::Raster { angle_rad: f64::to_radians(angle) };
         }
         let job = job(SIZE.x, SIZE.y, 10.0, 0.25, vec![op]);
         let target = relief(&job, 4.0, 0.0, &bumps);
@@ -326,6 +334,73 @@ fn a_raster_leaves_no_more_than_the_scallop() {
     }
 }
 
+/// A cone of 45 degrees: waterlines leave no more than the scallop on its flank, and do not touch the ground.
+#[test]
+fn waterlines_leave_no_more_than_the_scallop_on_steep_ground() {
+    let op = contour(cutter(CutterShape::Ball, 2.0), 0.02, 30.0);
+    let job = job(20.0, 20.0, 10.0, 0.1, vec![op]);
+    let middle = DVec2::splat(10.0);
+    let r = |p: DVec2| p.distance(middle);
+    let grid = Grid::covering(DVec2::ZERO, 20.0, 20.0, 0.1).unwrap();
+    let target = Heightfield::from_fn(grid, |p| (-r(p)).max(-5.0));
+    // Already roughed to 0.3 mm.
+    let start = Heightfield::from_fn(*target.grid(), |p| ((-r(p)).max(-5.0) + 0.3).min(0.0));
+    let mut block = Block::from_field(&job.stock, start.clone());
+    let paths = plan_from(&job, &target, &mut block, &mut |_| {}).unwrap();
+    assert!(paths[0].moves.iter().filter(|m| !m.is_rapid() && m.to.z == m.from.z).count() > 100);
+    for k in 0..grid.len() {
+        let p = grid.node(k % grid.nx, k / grid.nx);
+        let left = f64::from(block.field().z()[k] - target.z()[k]);
+        if (1.0..4.0).contains(&r(p)) {
+            // Normal to the flank.
+            let normal = left * std::f64::consts::FRAC_1_SQRT_2;
+            assert!((-0.011..0.02 + 0.011).contains(&normal), "{normal} at {p}");
+        } else if r(p) > 7.5 {
+            assert_eq!(block.field().z()[k], start.z()[k]);
+        }
+    }
+}
+
+/// A slot that the first cutter does not fit into: the second one works there and nowhere else, and clears it.
+#[test]
+fn rest_roughing_keeps_to_what_the_first_cutter_left() {
+    for pattern in [
+        Pattern::Contour { milling: crate::job::Milling::Climb },
+        Pattern::Raster { angle_rad: 0.0 },
+    ] {
+        let mut small = rough(cutter(CutterShape::Flat, 2.0), 0.2, 1.0);
+        if let OperationKind::Rough { pattern: p, .. } = &mut small.kind {
+            *p = pattern;
+        }
+        let job = job(
+            30.0,
+            20.0,
+            10.0,
+            0.1,
+            vec![rough(cutter(CutterShape::Flat, 6.0), 0.2, 1.0), small],
+        );
+        let grid = Grid::covering(DVec2::ZERO, 30.0, 20.0, 0.1).unwrap();
+        let inside = |p: DVec2| (p.y - 10.0).abs() < 2.0 && (8.0..22.0).contains(&p.x);
+        let target = Heightfield::from_fn(grid, |p| if inside(p) { -5.0 } else { -2.0 });
+        let paths = plan_quietly(&job, &target);
+        assert_eq!(paths.len(), 2);
+        for m in paths[1].moves.iter().filter(|m| !m.is_rapid()) {
+            assert!(inside(m.to.truncate()), "{pattern:?}: {}", m.to);
+        }
+        let mut block = Block::new(&job.stock, grid);
+        for path in &paths {
+            block.cut(&Profile::of(&path.cutter), &path.moves);
+        }
+        let floor = |p: DVec2| (p.y - 10.0).abs() < 1.65;
+        let deep =
+            (0..grid.len()).map(|k| (grid.node(k % grid.nx, k / grid.nx), block.field().z()[k]));
+        // A round corner of the cutter stays in the corners of the slot.
+        let high = deep.filter(|(p, _)| floor(*p) && (8.9..21.1).contains(&p.x)).map(|(_, z)| z);
+        let high = high.fold(f32::NEG_INFINITY, f32::max);
+        assert!(high < -4.79, "{pattern:?}: {high}");
+    }
+}
+
 #[test]
 fn roughing_clears_a_level_ground_down_to_the_allowance() {
     for shape in [CutterShape::Flat, CutterShape::Ball] {
@@ -337,7 +412,8 @@ fn roughing_clears_a_level_ground_down_to_the_allowance() {
             lower(&mut wood, &Profile::of(&path.cutter), m);
         }
         let (low, high) = wood.range().unwrap();
-        let cusp = if shape == CutterShape::Ball { 0.26 } else { 0.0 };
+        // In the corners of rings 2.4 mm apart the cusps stand on a distance of 2.4 sqrt(2).
+        let cusp = if shape == CutterShape::Ball { 0.527 } else { 0.0 };
         assert!((low + 3.5).abs() < 0.0011, "{shape:?}: {low}");
         assert!(f64::from(high) < -3.5 + cusp + 0.0011, "{shape:?}: {high}");
         // Three levels of 1.17 mm, each one chain.

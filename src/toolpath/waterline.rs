@@ -1,38 +1,28 @@
 //! Waterlines: the cutter goes round steep ground at constant Z.
 //!
-//! The levels are contours of the tip field, found by marching squares (Lorensen and Cline 1987, in the plane) in
-//! the cells that are asked for. Their vertices are then moved to where the exact drop reaches the level, and the
+//! The levels are contours of the tip field in the cells that are asked for. Their vertices are then moved to where the exact drop reaches the level, and the
 //! chords between them are checked with a cutter slimmed by the error budget, so that none enters a wall. At a
 //! wall the lowest level is enough: the flank of the cutter takes what stands above. So levels go from the bottom
 //! up, and only where wood is left.
 
-use super::Site;
 use super::chain::{Span, chains};
+use super::contours::{Edge, chords, contours, reached, runs_with};
 use super::emit::Emitter;
 use super::left::{Left, Surfaces};
 use super::order::{Direction, in_order};
-use super::raster::{TOP_MM, link};
+use super::raster::{TOP_MM, clear_deep_wood, link};
 use super::trace::{DROP_MM, LEAST_ROUNDING_MM, Tracer};
 use super::travel::Travel;
+use super::{Site, ToolpathError};
 use crate::cutter::Profile;
-use crate::geom::{DVec2, DVec3, Grid, Heightfield};
-use crate::offset::Dropper;
+use crate::geom::{DVec2, DVec3, Heightfield};
+use crate::job::Milling;
+use crate::offset::{Dropper, closing, tip_field};
 use crate::stock::Block;
 use rayon::prelude::*;
-use std::collections::HashMap;
 
 /// The lowest level lies this far above the lowest ground that is asked for, mm.
 const ABOVE_GROUND_MM: f64 = 0.002;
-/// How exactly a vertex stands where the tip field reaches the level, mm.
-const PLACE_MM: f64 = 2e-4;
-/// Stretches of a contour without wood shorter than this are cut through, mm.
-const GAP_MM: f64 = 4.0;
-/// Stretches shorter than this are left to passes across, mm.
-const SHORTEST_MM: f64 = 1.0;
-/// Contours begin and end this far beyond their work, mm.
-const ROOM_MM: f64 = 0.3;
-/// Farthest that a chord is pushed away from a wall that bulges towards it, mm.
-const PUSH_MM: f64 = 0.2;
 
 /// What waterlines are planned with.
 pub(super) struct Waterlines<'a> {
@@ -44,10 +34,12 @@ pub(super) struct Waterlines<'a> {
     pub(super) step_mm: f64,
     /// Wood that may be left, mm normal to `reach`.
     pub(super) limit_mm: f64,
+    /// How far chords may lie from contours, mm.
+    pub(super) fit_mm: f64,
 }
 
 /// A cell that may hold contours: its lower-left node, and its lowest and highest corner.
-struct Steep {
+struct Cell {
     node: usize,
     low: f32,
     high: f32,
@@ -69,29 +61,117 @@ pub(super) fn waterlines(site: &Site, lines: &Waterlines, block: &mut Block, out
     if high <= low {
         return;
     }
-    let rolled = profile.rolled(LEAST_ROUNDING_MM);
-    let exact = Dropper::new(site.target, rolled.clone());
-    let pitch_mm = site.target.grid().pitch_mm;
-    let fit_mm = site.job.tolerance.fit_mm;
-    let slim = Dropper::new(site.target, rolled.slimmed(DROP_MM));
-    let tracer = Tracer::new(|p: DVec2| exact.drop(p), rolled, pitch_mm, fit_mm);
+    let cutter = Rider::new(site, &profile);
     let levels = ((high - low) / lines.step_mm).ceil() as usize;
     for k in 0..levels {
         let z = low + k as f64 * lines.step_mm;
-        let contours = lines.contours(&cells, z, &exact);
-        let free = |p: DVec2| slim.drop(p) <= z + DROP_MM;
-        let spans: Vec<Span> = contours
-            .par_iter()
-            .flat_map_iter(|contour| {
-                let runs = runs_with(contour, |p| wanted.cap_mm(p) > f64::NEG_INFINITY);
-                runs.into_iter().flat_map(|run| chords(&run, fit_mm, free))
-            })
-            .map(|plan| plan.into_iter().map(|p| p.extend(z)).collect())
-            .collect();
+        let work = |p: DVec2| wanted.cap_mm(p) > f64::NEG_INFINITY;
+        let spans = lines.spans(&cells, z, &cutter, &work);
         if spans.is_empty() {
             continue;
         }
-        let wood = Dropper::new(block.field(), profile.clone());
+        cutter.ride(site, spans, block, out);
+        // The flank may have cleared the walls above.
+        let Some(still) = left(block) else { return };
+        wanted = still;
+        cells = lines.cells(&wanted);
+    }
+}
+
+/// The numbers of a contour operation.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Contour {
+    pub(super) scallop_mm: f64,
+    pub(super) steeper_than_rad: f64,
+    pub(super) milling: Milling,
+}
+
+/// Plans waterlines on all ground that is steep enough, from the top down, where wood is left, and takes them out of
+/// `block`. The levels are so close that the cusps between them keep to the scallop on the flattest ground that they cross.
+/// The moves go to `out`.
+pub(super) fn contour(
+    site: &Site,
+    cut: &Contour,
+    block: &mut Block,
+    out: &mut Emitter,
+) -> Result<(), ToolpathError> {
+    let profile = Profile::of(&site.operation.cutter);
+    let step_mm = site.stepover_of(cut.scallop_mm)?;
+    clear_deep_wood(site, 0.0, block, out)?;
+    let rolled = profile.rolled(LEAST_ROUNDING_MM);
+    let tip = tip_field(site.target, &rolled);
+    let reach = closing(&tip, &rolled);
+    let lines = Waterlines {
+        tip: &tip,
+        reach: &reach,
+        step_mm,
+        limit_mm: cut.scallop_mm,
+        fit_mm: site.job.tolerance.fit_mm,
+    };
+    let surfaces = Surfaces { tip: &tip, reach: &reach, wood: block.field() };
+    let Some(wanted) = surfaces.left(lines.limit_mm, &profile, step_mm) else { return Ok(()) };
+    let mut cells = lines.cells(&wanted);
+    let steepest = libm::sin(cut.steeper_than_rad);
+    cells.retain(|cell| lines.sine(cell) >= steepest);
+    let is_steep = {
+        let mut steep = vec![false; tip.grid().len()];
+        for node in cells.iter().flat_map(|c| corners(c.node, tip.grid().nx)) {
+            steep[node] = true;
+        }
+        steep
+    };
+    let cutter = Rider::new(site, &profile);
+    let work = |p: DVec2| {
+        let at = tip.grid().to_grid(p).round().max(DVec2::ZERO);
+        let (i, j) = (at.x as usize, at.y as usize);
+        i < tip.grid().nx && j < tip.grid().ny && is_steep[j * tip.grid().nx + i]
+    };
+    for z in lines.heights(&cells) {
+        let mut spans = lines.spans(&cells, z, &cutter, &work);
+        if cut.milling == Milling::Conventional {
+            for span in &mut spans {
+                span.reverse();
+            }
+        }
+        cutter.ride(site, spans, block, out);
+    }
+    Ok(())
+}
+
+/// The corners of the cell at a node.
+fn corners(node: usize, nx: usize) -> [usize; 4] {
+    [node, node + 1, node + nx, node + nx + 1]
+}
+
+/// The cutter with what follows the target under it.
+struct Rider<'a> {
+    profile: Profile,
+    rolled: Profile,
+    exact: Dropper<'a>,
+    /// The cutter slimmed by the error budget.
+    slim: Dropper<'a>,
+}
+
+impl<'a> Rider<'a> {
+    fn new(site: &Site<'a>, profile: &Profile) -> Self {
+        let rolled = profile.rolled(LEAST_ROUNDING_MM);
+        Self {
+            profile: profile.clone(),
+            exact: Dropper::new(site.target, rolled.clone()),
+            slim: Dropper::new(site.target, rolled.slimmed(DROP_MM)),
+            rolled,
+        }
+    }
+
+    /// Cuts the spans of a level and takes them out of `block`.
+    fn ride(&self, site: &Site, spans: Vec<Span>, block: &mut Block, out: &mut Emitter) {
+        if spans.is_empty() {
+            return;
+        }
+        let (pitch_mm, fit_mm) = (site.target.grid().pitch_mm, site.job.tolerance.fit_mm);
+        let tracer =
+            Tracer::new(|p: DVec2| self.exact.drop(p), self.rolled.clone(), pitch_mm, fit_mm);
+        let wood = Dropper::new(block.field(), self.profile.clone());
         let travel = Travel::new(site.job, site.operation, block);
         let link = |done: &[DVec3], next: &[DVec3]| link(site, &travel, &tracer, done, next);
         let before = out.moves().len();
@@ -100,216 +180,109 @@ pub(super) fn waterlines(site: &Site, lines: &Waterlines, block: &mut Block, out
             let touch_mm = wood.drop(chain[0].truncate());
             out.chain(&chain, touch_mm, &travel);
         }
-        block.cut(&profile, &out.moves()[before..]);
-        // The flank may have cleared the walls above.
-        let Some(still) = left(block) else { return };
-        wanted = still;
-        cells = lines.cells(&wanted);
+        block.cut(&self.profile, &out.moves()[before..]);
     }
 }
 
 impl Waterlines<'_> {
     /// The cells with a wanted corner.
-    fn cells(&self, wanted: &Left) -> Vec<Steep> {
+    fn cells(&self, wanted: &Left) -> Vec<Cell> {
         let grid = self.tip.grid();
         let z = self.tip.z();
         let cell = |node: usize| {
-            let corners = [node, node + 1, node + grid.nx, node + grid.nx + 1];
+            let corners = corners(node, grid.nx);
             corners.iter().any(|&k| wanted.is_wanted(k)).then(|| {
                 let heights = corners.map(|k| z[k]);
                 let low = heights.into_iter().fold(f32::INFINITY, f32::min);
                 let high = heights.into_iter().fold(f32::NEG_INFINITY, f32::max);
-                Steep { node, low, high }
+                Cell { node, low, high }
             })
         };
         let row = |j: usize| (0..grid.nx - 1).filter_map(move |i| cell(j * grid.nx + i));
         (0..grid.ny - 1).into_par_iter().flat_map_iter(row).collect()
     }
 
+    /// What is to be cut at height `z`: the stretches of its contours with work, as chords.
+    fn spans(
+        &self,
+        cells: &[Cell],
+        z: f64,
+        cutter: &Rider,
+        work: &(impl Fn(DVec2) -> bool + Sync),
+    ) -> Vec<Span> {
+        let fit_mm = self.fit_mm;
+        let contours = self.contours(cells, z, &cutter.exact);
+        let free = |p: DVec2| cutter.slim.drop(p) <= z + DROP_MM;
+        let cut = |contour: &Vec<DVec2>| {
+            let runs = runs_with(contour, work);
+            runs.into_iter().flat_map(|run| chords(&run, fit_mm, free)).collect::<Vec<_>>()
+        };
+        let plans = contours.par_iter().flat_map_iter(cut);
+        plans.map(|plan| plan.into_iter().map(|p| p.extend(z)).collect()).collect()
+    }
+
+    /// Sine of the angle of a cell's ground under the tip with the level.
+    fn sine(&self, cell: &Cell) -> f64 {
+        let [a, b, c, d] =
+            corners(cell.node, self.tip.grid().nx).map(|k| f64::from(self.tip.z()[k]));
+        let twice = 2.0 * self.tip.grid().pitch_mm;
+        let slope = DVec2::new(b + d - a - c, c + d - a - b) / twice;
+        let steep = slope.length_squared();
+        (steep / (1.0 + steep)).sqrt()
+    }
+
+    /// Heights of levels from the top of the cells to their foot, as far apart as the flattest cell between two of
+    /// them allows.
+    fn heights(&self, cells: &[Cell]) -> Vec<f64> {
+        /// Bins to a step on a wall.
+        const BINS: f64 = 16.0;
+        let low = cells.iter().map(|c| f64::from(c.low)).fold(f64::INFINITY, f64::min);
+        let high = cells.iter().map(|c| f64::from(c.high)).fold(f64::NEG_INFINITY, f64::max);
+        let high = high.min(TOP_MM);
+        if low >= high {
+            return Vec::new();
+        }
+        let bin_mm = self.step_mm / BINS;
+        let bin = |z: f64| ((high - z) / bin_mm).max(0.0) as usize;
+        let mut flattest = vec![1.0_f64; bin(low) + 1];
+        for cell in cells {
+            let sine = self.sine(cell);
+            let (from, to) = (bin(f64::from(cell.high)), bin(f64::from(cell.low)));
+            for flat in &mut flattest[from..=to] {
+                *flat = flat.min(sine);
+            }
+        }
+        let mut heights = Vec::new();
+        let mut z = high;
+        loop {
+            // The longest step that every bin under it allows.
+            let mut step = self.step_mm;
+            let mut k = bin(z);
+            while k < flattest.len() && (k as f64) * bin_mm < high - z + step {
+                step = step.min(self.step_mm * flattest[k]);
+                k += 1;
+            }
+            z -= step;
+            if z <= low {
+                break;
+            }
+            heights.push(z);
+        }
+        heights.push(low + ABOVE_GROUND_MM);
+        heights
+    }
+
     /// The contours at height `z` where the cutter may go, each with the ground on its right: cut in this direction
     /// the teeth climb. A closed one repeats its first point at the end.
-    fn contours(&self, cells: &[Steep], z: f64, exact: &Dropper) -> Vec<Vec<DVec2>> {
-        let grid = *self.tip.grid();
-        let segments: Vec<[Edge; 2]> = cells
-            .iter()
-            .filter(|c| f64::from(c.low) <= z && f64::from(c.high) > z)
-            .flat_map(|c| self.segments(c.node, z))
-            .collect();
-        let paths = joined(&segments);
+    fn contours(&self, cells: &[Cell], z: f64, exact: &Dropper) -> Vec<Vec<DVec2>> {
+        let straddled = cells.iter().filter(|c| f64::from(c.low) <= z && f64::from(c.high) > z);
+        let paths = contours(self.tip, straddled.map(|c| c.node), z);
         let place = |edge: &Edge| {
-            let (inside, outside) = edge.ends(&grid, self.tip, z);
+            let (inside, outside) = edge.ends(self.tip, z);
             reached(inside, outside, |p| exact.drop(p) <= z)
         };
         paths.par_iter().map(|path| path.iter().map(place).collect()).collect()
     }
-
-    /// The pieces of contour in a cell, from edge to edge, higher ground on the right.
-    fn segments(&self, node: usize, z: f64) -> Vec<[Edge; 2]> {
-        let nx = self.tip.grid().nx;
-        // Corners and edges counter-clockwise: edge k runs from corner k to corner k + 1.
-        let corners = [node, node + 1, node + nx + 1, node + nx];
-        let heights = corners.map(|k| f64::from(self.tip.z()[k]));
-        let is_high = heights.map(|h| h > z);
-        let edge = |k: usize| Edge::between(corners[k], corners[(k + 1) % 4]);
-        // With the high corner on its right a piece runs from the edge that rises to that corner, walking round the
-        // cell, to the edge that falls from it.
-        let rises: Vec<usize> = (0..4).filter(|&k| !is_high[k] && is_high[(k + 1) % 4]).collect();
-        let falls: Vec<usize> = (0..4).filter(|&k| is_high[k] && !is_high[(k + 1) % 4]).collect();
-        match (rises[..].first(), falls[..].first()) {
-            (Some(&rise), Some(&fall)) if rises.len() == 1 => vec![[edge(rise), edge(fall)]],
-            (Some(_), Some(_)) => {
-                // A saddle: the middle decides whether the high corners are joined.
-                let joined = heights.iter().sum::<f64>() / 4.0 > z;
-                rises
-                    .iter()
-                    .map(|&rise| {
-                        // The edge that falls from the other high corner, or from this one.
-                        let fall = if joined { (rise + 3) % 4 } else { (rise + 1) % 4 };
-                        [edge(rise), edge(fall)]
-                    })
-                    .collect()
-            }
-            _ => vec![],
-        }
-    }
-}
-
-/// An edge of the grid: its two nodes, the lower index first.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-struct Edge(usize, usize);
-
-impl Edge {
-    fn between(a: usize, b: usize) -> Self {
-        Self(a.min(b), a.max(b))
-    }
-
-    /// Its end where the tip may be at height `z`, and the other one.
-    fn ends(&self, grid: &Grid, tip: &Heightfield, z: f64) -> (DVec2, DVec2) {
-        let at = |k: usize| grid.node(k % grid.nx, k / grid.nx);
-        if f64::from(tip.z()[self.0]) <= z {
-            (at(self.0), at(self.1))
-        } else {
-            (at(self.1), at(self.0))
-        }
-    }
-}
-
-/// Segments joined end to start, in the order of their first ones; open paths before closed ones.
-fn joined(segments: &[[Edge; 2]]) -> Vec<Vec<Edge>> {
-    let next: HashMap<Edge, usize> = segments.iter().enumerate().map(|(k, s)| (s[0], k)).collect();
-    let ends: HashMap<Edge, usize> = segments.iter().enumerate().map(|(k, s)| (s[1], k)).collect();
-    let mut used = vec![false; segments.len()];
-    let mut paths = Vec::new();
-    let starts = (0..segments.len()).filter(|&k| !ends.contains_key(&segments[k][0]));
-    for start in starts.chain(0..segments.len()) {
-        if used[start] {
-            continue;
-        }
-        let mut path = vec![segments[start][0]];
-        let mut at = Some(start);
-        while let Some(k) = at.filter(|&k| !used[k]) {
-            used[k] = true;
-            path.push(segments[k][1]);
-            at = next.get(&segments[k][1]).copied();
-        }
-        paths.push(path);
-    }
-    paths
-}
-
-/// The last place from `inside` towards `outside` where `free` holds, to [`PLACE_MM`].
-fn reached(inside: DVec2, outside: DVec2, free: impl Fn(DVec2) -> bool) -> DVec2 {
-    let (mut a, mut b) = (inside, outside);
-    while a.distance_squared(b) > PLACE_MM * PLACE_MM {
-        let middle = a.midpoint(b);
-        if free(middle) { a = middle } else { b = middle }
-    }
-    a
-}
-
-/// The stretches of a contour with points where `work` holds, with room at both ends; short gaps are kept.
-fn runs_with(contour: &[DVec2], work: impl Fn(DVec2) -> bool) -> Vec<Vec<DVec2>> {
-    let mut along = Vec::with_capacity(contour.len());
-    let mut s = 0.0;
-    for (k, p) in contour.iter().enumerate() {
-        s += if k > 0 { p.distance(contour[k - 1]) } else { 0.0 };
-        along.push(s);
-    }
-    let mut stretches: Vec<(f64, f64)> = Vec::new();
-    for (&s, _) in along.iter().zip(contour).filter(|(_, p)| work(**p)) {
-        match stretches.last_mut() {
-            Some((_, to)) if s - *to <= GAP_MM => *to = s,
-            _ => stretches.push((s, s)),
-        }
-    }
-    stretches
-        .into_iter()
-        .filter(|(from, to)| to - from >= SHORTEST_MM)
-        .map(|(from, to)| {
-            let first = along.partition_point(|&s| s < from - ROOM_MM);
-            let end = along.partition_point(|&s| s <= to + ROOM_MM);
-            contour[first..end].to_vec()
-        })
-        .filter(|run| run.len() > 1)
-        .collect()
-}
-
-/// True when `free` holds along the straight way from `a` to `b`.
-fn checked(a: DVec2, b: DVec2, free: impl Fn(DVec2) -> bool) -> bool {
-    /// Distance of the places looked at, mm: between them a wall can bulge by no more than 0.1 um.
-    const LOOK_MM: f64 = 0.05;
-    let n = (a.distance(b) / LOOK_MM).ceil().max(2.0) as usize;
-    (1..n).all(|k| free(a.lerp(b, k as f64 / n as f64)))
-}
-
-/// A run as few chords: at most `fit_mm` from its points, and `free` all along. Split where no chord is free.
-fn chords(run: &[DVec2], fit_mm: f64, free: impl Fn(DVec2) -> bool) -> Vec<Vec<DVec2>> {
-    let fits = |i: usize, j: usize| {
-        let near = |p: &DVec2| crate::geom::distance_to_segment(*p, run[i], run[j]) <= fit_mm;
-        run[i + 1..j].iter().all(near) && checked(run[i], run[j], &free)
-    };
-    let mut pieces = Vec::new();
-    let mut piece = vec![run[0]];
-    let mut i = 0;
-    while i + 1 < run.len() {
-        let mut j = i + 1;
-        let mut stride = 1;
-        while j + stride < run.len() && fits(i, j + stride) {
-            j += stride;
-            stride *= 2;
-        }
-        while stride > 0 {
-            if j + stride < run.len() && fits(i, j + stride) {
-                j += stride;
-            }
-            stride /= 2;
-        }
-        if j == i + 1 && !checked(run[i], run[j], &free) {
-            match pushed(run[i], run[j], &free) {
-                Some(middle) => piece.push(middle),
-                None => pieces.push(std::mem::take(&mut piece)),
-            }
-        }
-        piece.push(run[j]);
-        i = j;
-    }
-    pieces.push(piece);
-    pieces.retain(|piece| piece.len() > 1);
-    pieces
-}
-
-/// A point beside the middle of a chord, away from the ground on its right, by which the way is free.
-fn pushed(a: DVec2, b: DVec2, free: impl Fn(DVec2) -> bool) -> Option<DVec2> {
-    let left = (b - a).normalize_or_zero().perp();
-    let mut by = 0.004;
-    while by <= PUSH_MM {
-        let middle = a.midpoint(b) + left * by;
-        if free(middle) && checked(a, middle, &free) && checked(middle, b, &free) {
-            return Some(middle);
-        }
-        by *= 2.0;
-    }
-    None
 }
 
 /// The spans as rows of one each: the nearest to the end of the one before comes next.
@@ -332,10 +305,10 @@ fn nearest_first(spans: Vec<Span>) -> Vec<Vec<Span>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geom::signed_area;
+    use crate::geom::{Grid, signed_area};
 
     fn lines(tip: &Heightfield) -> Waterlines<'_> {
-        Waterlines { tip, reach: tip, step_mm: 0.5, limit_mm: 0.01 }
+        Waterlines { tip, reach: tip, step_mm: 0.5, limit_mm: 0.01, fit_mm: 0.004 }
     }
 
     /// A cone under a thin cutter: its contours are circles, run with the cone on the right.
@@ -371,35 +344,5 @@ mod tests {
         // The saddle lies at 3 * 2 exp(-2) - 4 = -3.19.
         assert_eq!(lines.contours(&cells, -3.0, &exact).len(), 2);
         assert_eq!(lines.contours(&cells, -3.4, &exact).len(), 1);
-    }
-
-    #[test]
-    fn chords_are_few_stay_near_and_keep_clear() {
-        let n = 400;
-        let circle: Vec<DVec2> = (0..=n)
-            .map(|k| DVec2::from_angle(-std::f64::consts::TAU * f64::from(k) / f64::from(n)) * 5.0)
-            .collect();
-        // The ground is inside the circle, which runs clockwise round it: chords would cut into it.
-        let free = |p: DVec2| p.length() >= 5.0 - 0.003;
-        let pieces = chords(&circle, 0.01, free);
-        assert_eq!(pieces.len(), 1);
-        let piece = &pieces[0];
-        // A chord with a sagitta of 0.003 mm spans 2 sqrt(2 * 5 * 0.003) = 0.35 mm.
-        let least = std::f64::consts::TAU * 5.0 / 0.35;
-        assert!((piece.len() as f64) < 1.3 * least && piece.len() as f64 > 0.8 * least);
-        for pair in piece.windows(2) {
-            assert!(checked(pair[0], pair[1], free));
-        }
-    }
-
-    #[test]
-    fn only_stretches_with_work_are_cut() {
-        let line: Vec<DVec2> = (0..=200).map(|k| DVec2::new(0.1 * f64::from(k), 0.0)).collect();
-        let work = |p: DVec2| (3.0..5.0).contains(&p.x) || (6.0..7.0).contains(&p.x) || p.x > 15.0;
-        let runs = runs_with(&line, work);
-        assert_eq!(runs.len(), 2);
-        let ends = |run: &[DVec2]| (run[0].x, run[run.len() - 1].x);
-        assert!((ends(&runs[0]).0 - 2.7).abs() < 0.11 && (ends(&runs[0]).1 - 7.2).abs() < 0.11);
-        assert!((ends(&runs[1]).0 - 14.8).abs() < 0.11 && (ends(&runs[1]).1 - 20.0).abs() < 1e-9);
     }
 }

@@ -71,7 +71,7 @@ fn wrong_types_say_what_there_is_and_what_is_wanted() {
         &with("[[operation]]\nkind = 3\n"),
         kind,
         (4, 8),
-        &["\"rough\", \"finish\" or \"raster\""],
+        &["\"rough\", \"finish\", \"raster\" or \"contour\""],
     );
     refused(&with("[layer]\nselect = \"all\"\n"), kind, (3, 1), &["[[layer]]"]);
     refused("artwork = 3\n", kind, (1, 11), &["an [artwork] table"]);
@@ -125,8 +125,8 @@ fn unknown_names_name_the_nearest() {
     );
     let cutter = with("[[operation]]\nkind = \"raster\"\ncutter = \"ball3\"\n");
     refused(&cutter, kind, (5, 10), &["did you mean \"ball-3\"?"]);
-    let contour = with("[[operation]]\nkind = \"contour\"\n");
-    refused(&contour, kind, (4, 8), &["contour", "there is: rough, finish, raster"]);
+    let contour = with("[[operation]]\nkind = \"pencil\"\n");
+    refused(&contour, kind, (4, 8), &["pencil", "there is: rough, finish, raster, contour"]);
     let layer = |line: &str| with(&format!("[[layer]]\nselect = \"all\"\n{line}\n"));
     refused(
         &layer("surface = \"rule\""),

@@ -192,7 +192,8 @@ proptest! {
              [relief]\nbackground = {background}\n[safety]\nramp_deg = {ramp}\n\
              [[layer]]\nselect = \"all\"\nheight_mm = {height}\ndraft_deg = {draft_deg}\n\
              surface = {{ method = \"profile\", profile = \"{profile}\", radius_mm = 2.5 }}\nslope_cap = \"none\"\nunion = true\n\
-             [[operation]]\nkind = \"rough\"\nstepdown_mm = 0.7\nangle_deg = {angle}\n\
+             [[operation]]\nkind = \"rough\"\nstepdown_mm = 0.7\npattern = \"raster\"\nangle_deg = {angle}\n\
+             [[operation]]\nkind = \"contour\"\nsteeper_than_deg = 41\nmilling = \"conventional\"\n\
              [[operation]]\nkind = \"raster\"\ncutter = \"ball-6\"\nstepover_mm = 0.3\n\
              [[operation]]\nkind = \"raster\"\nangle_deg = {ramp}\n"
         );
