@@ -13,10 +13,12 @@
 //! ```
 
 pub mod arc;
+mod distance;
 mod heightfield;
 mod moves;
 mod polygon;
 
+pub use distance::distance_field;
 pub use glam::{DVec2, DVec3};
 pub use heightfield::{Grid, GridError, Heightfield};
 pub use moves::{Move, MoveKind};

@@ -50,7 +50,7 @@ use geom::{DVec3, Move, MoveKind};
 use job::{Draft, Job, JobError};
 use outline::{OutlineError, Outlines};
 use proof::{ProgramText, ProofError, Verdict};
-use relief::{Relief, ReliefError};
+use relief::{Grounds, Relief, ReliefError};
 use surface::SurfaceError;
 use toolpath::{PlanEvent, Toolpath, ToolpathError};
 
@@ -126,7 +126,8 @@ pub fn carve(
     let mut notes = design.notes.clone();
 
     enter("toolpaths");
-    let paths = toolpath::plan(job, target, &mut |event| {
+    let grounds = Grounds::new(job, &design.outlines, target);
+    let paths = toolpath::plan(job, &grounds, &mut |event| {
         if let PlanEvent::Note(note) = event {
             notes.push(note);
         }
@@ -135,7 +136,7 @@ pub fn carve(
     let programs: Vec<Program> =
         paths.iter().enumerate().map(|(k, path)| emit(job, k + 1, path)).collect();
     enter("reach");
-    let reach = offset::reach(job, target);
+    let reach = offset::reach(job, &grounds);
     enter("proof");
     let texts: Vec<ProgramText<'_>> = programs
         .iter()

@@ -6,11 +6,13 @@
 
 mod combine;
 mod coverage;
+mod ground;
 mod merge;
 mod raster;
 
 pub use combine::{feather_weight, joined, smooth_max, smooth_min};
 pub use coverage::coverage;
+pub use ground::Grounds;
 pub use merge::merge;
 pub use raster::{Raster, rasterise};
 

@@ -10,7 +10,6 @@
 
 mod chain;
 mod check;
-mod clearance;
 mod contours;
 mod emit;
 mod finish;
@@ -36,6 +35,7 @@ pub use check::PathFault;
 
 use crate::geom::{Heightfield, Move, MoveKind};
 use crate::job::{CutterSpec, Job, Operation, OperationKind, Pattern};
+use crate::relief::Grounds;
 use crate::stock::Block;
 use emit::Emitter;
 use pocket::Pockets;
@@ -146,6 +146,7 @@ const MOST_SAMPLES: f64 = 1e8;
 /// What an operation is planned for.
 struct Site<'a> {
     job: &'a Job,
+    /// As deep as the operation may go.
     target: &'a Heightfield,
     operation: &'a Operation,
     /// Number of the operation, from 1.
@@ -189,7 +190,7 @@ impl Site<'_> {
 
 /// Plans every operation of the job on the wood that the earlier ones leave.
 ///
-/// `target` is the relief in work coordinates over the whole stock. One [`Toolpath`] a program: operations
+/// `grounds` tells how deep each operation may go, over the whole stock. One [`Toolpath`] a program: operations
 /// that follow each other with the same cutter and spindle speed share one. Every path holds [`Toolpath::check`].
 ///
 /// # Errors
@@ -197,27 +198,28 @@ impl Site<'_> {
 /// another one cuts.
 pub fn plan(
     job: &Job,
-    target: &Heightfield,
+    grounds: &Grounds,
     observe: &mut dyn FnMut(PlanEvent),
 ) -> Result<Vec<Toolpath>, ToolpathError> {
-    plan_from(job, target, &mut Block::new(&job.stock, *target.grid()), observe)
+    let mut block = Block::new(&job.stock, *grounds.target().grid());
+    plan_from(job, grounds, &mut block, observe)
 }
 
 /// [`plan`] on wood that is carved already; `block` follows, but for what the last operation takes.
 fn plan_from(
     job: &Job,
-    target: &Heightfield,
+    grounds: &Grounds,
     block: &mut Block,
     observe: &mut dyn FnMut(PlanEvent),
 ) -> Result<Vec<Toolpath>, ToolpathError> {
-    check_target(job, target)?;
+    check_target(job, grounds.target())?;
     let fresh = block.field().range().is_some_and(|(low, _)| low == 0.0);
     let mut paths: Vec<Toolpath> = Vec::new();
     let total = job.operations.len();
     for (index, operation) in job.operations.iter().enumerate() {
         let site = Site {
             job,
-            target,
+            target: grounds.of(index),
             operation,
             number: index + 1,
             fresh: fresh && paths.is_empty(),

@@ -6,14 +6,14 @@ use toml::de::{DeTable, DeValue};
 
 use super::error::{JobError, Source, shown};
 use super::keys::{
-    ARTWORK, AT, BACKGROUND, LAYER, MACHINE, OPERATION, RELIEF, SAFETY, STOCK, TOLERANCE, TOP,
-    WOOD, rule,
+    ARTWORK, AT, BACKGROUND, KEEP_OUT, LAYER, MACHINE, OPERATION, RELIEF, SAFETY, STOCK, TOLERANCE,
+    TOP, WOOD, rule,
 };
 use super::layer::{LayerDraft, read_layer};
 use super::library::{Library, read_machine, read_machine_file, read_wood};
 use super::operation::{OperationDraft, default_operations, read_operation};
 use super::reader::{Table, as_number};
-use super::types::{ArtworkSpec, Fit, Machine, Origin, Place, Wood};
+use super::types::{ArtworkSpec, Fit, KeepOut, Machine, Origin, Place, Wood};
 use crate::geom::{DVec2, Tolerance};
 
 /// A checked job in which what hangs on the artwork is still open: sizes, stock, layers.
@@ -32,6 +32,7 @@ pub struct Draft {
     pub(super) tolerance: Tolerance,
     pub(super) safe_z_mm: f64,
     pub(super) clearance_mm: f64,
+    pub(super) keep_outs: Vec<KeepOut>,
     pub(super) ramp_rad: f64,
     pub(super) layers: Vec<LayerDraft>,
     pub(super) operations: Vec<OperationDraft>,
@@ -127,6 +128,7 @@ fn read(
     let safety = or_empty("safety", &SAFETY)?;
     let layers = top.tables("layer", &LAYER)?;
     let operations = top.tables("operation", &OPERATION)?;
+    let keep_outs = top.tables("keep_out", &KEEP_OUT)?;
     let draft = Draft {
         source: Source::default(),
         title: top.text("title").map(str::to_owned),
@@ -154,6 +156,17 @@ fn read(
         safe_z_mm: safety.sure_number("safe_z_mm"),
         clearance_mm: safety.sure_number("clearance_mm"),
         ramp_rad: safety.sure_number("ramp_deg").to_radians(),
+        keep_outs: keep_outs
+            .iter()
+            .map(|table| {
+                let number = |key: &str| table.sure_number(key);
+                KeepOut {
+                    at: DVec2::new(number("x_mm"), number("y_mm")),
+                    size: DVec2::new(number("width_mm"), number("height_mm")),
+                    top_mm: number("top_mm"),
+                }
+            })
+            .collect(),
         layers: layers.iter().map(read_layer).collect::<Result<_, _>>()?,
         operations: if operations.is_empty() {
             default_operations(top.source, library)?
@@ -170,6 +183,17 @@ fn read(
         let name = if safety.raw("clearance_mm").is_some() { "clearance_mm" } else { "safe_z_mm" };
         let help = "rapids travel at safe_z_mm and go down to clearance_mm above the wood";
         return Err(safety.impossible(name, &message, "", help));
+    }
+    for (zone, table) in draft.keep_outs.iter().zip(&keep_outs) {
+        let needs = zone.top_mm + draft.clearance_mm;
+        if needs > draft.safe_z_mm {
+            let message = format!(
+                "what stands {} mm high is not cleared by rapids at safe_z_mm {}",
+                zone.top_mm, draft.safe_z_mm
+            );
+            let help = format!("set safety.safe_z_mm to {needs} or more");
+            return Err(table.impossible("top_mm", &message, "", &help));
+        }
     }
     Ok(draft)
 }

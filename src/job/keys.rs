@@ -176,8 +176,8 @@ const fn key(name: &'static str, kind: Kind, default: Fallback, doc: &'static st
 use Fallback::{Flag, Number, Required, Rule, Text};
 
 /// The sections of a job, in the order in which they are written out.
-pub(super) static JOB: [&Section; 9] =
-    [&TOP, &STOCK, &ARTWORK, &RELIEF, &TOLERANCE, &SAFETY, &LAYER, &SURFACE, &OPERATION];
+pub(super) static JOB: [&Section; 10] =
+    [&TOP, &STOCK, &ARTWORK, &RELIEF, &TOLERANCE, &SAFETY, &KEEP_OUT, &LAYER, &SURFACE, &OPERATION];
 
 /// Top level of a job.
 pub(super) static TOP: Section = Section {
@@ -205,6 +205,12 @@ pub(super) static TOP: Section = Section {
         key("relief", Kind::Forms("a [relief] table"), Rule("as below"), "the heightfield"),
         key("tolerance", Kind::Forms("a [tolerance] table"), Rule("as below"), "small numbers"),
         key("safety", Kind::Forms("a [safety] table"), Rule("as below"), "travel above the wood"),
+        key(
+            "keep_out",
+            Kind::Forms("[[keep_out]] tables"),
+            Rule("none"),
+            "where clamps or screws are",
+        ),
         key(
             "layer",
             Kind::Forms("[[layer]] tables"),
@@ -395,6 +401,25 @@ pub(super) static SAFETY: Section = Section {
             "gap above the wood where a rapid down ends and a feed begins",
         ),
         key("ramp_deg", deg(0.5, 30.0), Number(5.0), "steepest entry into wood"),
+    ],
+};
+
+/// `[[keep_out]]`
+pub(super) static KEEP_OUT: Section = Section {
+    name: "keep_out",
+    header: "[[keep_out]]",
+    doc: "a rectangle where something stands on the stock, a clamp or a screw: no tool comes there",
+    keys: &[
+        key("x_mm", mm(-LENGTH, LENGTH), Required, "its left side, in work coordinates"),
+        key("y_mm", mm(-LENGTH, LENGTH), Required, "its lower side, in work coordinates"),
+        key("width_mm", mm(0.1, LENGTH), Required, "size along X"),
+        key("height_mm", mm(0.1, LENGTH), Required, "size along Y"),
+        key(
+            "top_mm",
+            mm(0.0, 200.0),
+            Required,
+            "height of what stands there above the stock's top",
+        ),
     ],
 };
 
@@ -609,6 +634,18 @@ pub(super) static OPERATION: Section = Section {
             deg(1.0, 89.0),
             Number(30.0),
             "contour: flatter ground is left to other operations",
+        ),
+        key(
+            "within",
+            Kind::Forms("\"stock\", \"artwork\" or a list of layers' names"),
+            Text("stock"),
+            "where it works: all over the stock, or near the outlines of all or some layers",
+        ),
+        key(
+            "margin_mm",
+            mm(-100.0, 1000.0),
+            Number(0.0),
+            "wood is cut up to this and the cutter's radius outside those outlines",
         ),
         key(
             "angle_deg",

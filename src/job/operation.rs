@@ -11,7 +11,8 @@ use super::reader::Table;
 use super::settle::round;
 use super::speeds::{self, Speeds, Wanted};
 use super::types::{
-    CutterShape, CutterSpec, Milling, Operation, OperationKind, Pattern, Stepover, Stock,
+    CutterShape, CutterSpec, LayerSpec, Milling, Operation, OperationKind, Pattern, Stepover,
+    Stock, Within,
 };
 
 /// An operation whose numbers may still be open.
@@ -28,9 +29,20 @@ pub(super) struct OperationDraft {
     pub(super) pattern: usize,
     pub(super) milling: Milling,
     pub(super) steeper_than_rad: f64,
+    pub(super) within: WithinDraft,
+    pub(super) margin_mm: f64,
     pub(super) feed_mm_per_min: Option<f64>,
     pub(super) plunge_mm_per_min: Option<f64>,
     pub(super) spindle_rpm: Option<f64>,
+}
+
+/// Where an operation works.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum WithinDraft {
+    Stock,
+    Artwork,
+    /// By name.
+    Layers(Vec<String>),
 }
 
 /// What an operation does.
@@ -138,11 +150,29 @@ fn operation(
         pattern: table.choice("pattern"),
         milling: [Milling::Climb, Milling::Conventional][table.choice("milling")],
         steeper_than_rad: table.sure_number("steeper_than_deg").to_radians(),
+        within: read_within(table)?,
+        margin_mm: table.sure_number("margin_mm"),
         angle_rad: table.number("angle_deg").map(f64::to_radians),
         feed_mm_per_min: table.number("feed_mm_per_min"),
         plunge_mm_per_min: table.number("plunge_mm_per_min"),
         spindle_rpm: table.number("spindle_rpm"),
     })
+}
+
+fn read_within(table: &Table<'_>) -> Result<WithinDraft, JobError> {
+    let Some(value) = table.raw("within") else { return Ok(WithinDraft::Stock) };
+    match value.get_ref() {
+        DeValue::String(word) if word == "stock" => Ok(WithinDraft::Stock),
+        DeValue::String(word) if word == "artwork" => Ok(WithinDraft::Artwork),
+        DeValue::Array(names) if !names.is_empty() => {
+            let name = |value: &toml::Spanned<DeValue<'_>>| match value.get_ref() {
+                DeValue::String(name) => Ok(name.to_string()),
+                other => Err(table.wrong_form("within", value.span(), other)),
+            };
+            Ok(WithinDraft::Layers(names.iter().map(name).collect::<Result<_, _>>()?))
+        }
+        other => Err(table.wrong_form("within", value.span(), other)),
+    }
 }
 
 fn read_cutter_choice(
@@ -169,6 +199,7 @@ impl Draft {
         &self,
         stock: &Stock,
         pitch_mm: f64,
+        layers: &[LayerSpec],
         notes: &mut Vec<String>,
     ) -> Result<Vec<Operation>, JobError> {
         if self.operations.first().is_some_and(|op| op.kind != KindDraft::Rough) {
@@ -190,6 +221,7 @@ impl Draft {
                     feed_mm_per_min: speeds.feed_mm_per_min,
                     plunge_mm_per_min: speeds.plunge_mm_per_min,
                     spindle_rpm: speeds.spindle_rpm,
+                    within: step.within(layers)?,
                 })
             })
             .collect()
@@ -211,6 +243,29 @@ impl Step<'_> {
         let paths: Vec<String> = keys.iter().map(|key| format!("{whole}.{key}")).collect();
         let paths: Vec<&str> = paths.iter().chain([&whole]).map(String::as_str).collect();
         Err(self.job.impossible(&paths, message, help))
+    }
+
+    /// Where it works, its layers found by their names.
+    fn within(&self, layers: &[LayerSpec]) -> Result<Within, JobError> {
+        let margin_mm = self.draft.margin_mm;
+        let indices = match &self.draft.within {
+            WithinDraft::Stock => return Ok(Within::Stock),
+            WithinDraft::Artwork => (0..layers.len()).filter(|&k| layers[k].visible).collect(),
+            WithinDraft::Layers(names) => {
+                let mut found = Vec::new();
+                for name in names {
+                    let Some(k) = layers.iter().position(|layer| layer.name == *name) else {
+                        let names: Vec<&str> = layers.iter().map(|l| l.name.as_str()).collect();
+                        let message = format!("there is no layer called '{name}'");
+                        let help = format!("there is: {}", names.join(", "));
+                        return self.refuse(&["within"], &message, &help);
+                    };
+                    found.push(k);
+                }
+                found
+            }
+        };
+        Ok(Within::Layers { layers: indices, margin_mm })
     }
 
     fn check_cutter(&self, pitch_mm: f64) -> Result<(), JobError> {

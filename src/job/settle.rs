@@ -37,13 +37,14 @@ impl Draft {
         self.check_depth(&stock, &mut notes)?;
         let pitch_mm = self.pitch(&stock)?;
         let layers = self.layers(found)?;
-        let operations = self.operations(&stock, pitch_mm, &mut notes)?;
+        let operations = self.operations(&stock, pitch_mm, &layers, &mut notes)?;
         Ok(Job {
             title: self.title.clone().unwrap_or_else(|| stem(&self.artwork.file)),
             relief: ReliefSpec { pitch_mm, depth_mm: self.depth_mm, background },
             stock,
             layers,
             operations,
+            keep_outs: self.keep_outs.clone(),
             tolerance: self.tolerance,
             safe_z_mm: self.safe_z_mm,
             clearance_mm: self.clearance_mm,

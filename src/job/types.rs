@@ -19,6 +19,8 @@ pub struct Job {
     pub layers: Vec<LayerSpec>,
     /// The operations in the order of work; never empty.
     pub operations: Vec<Operation>,
+    /// Where nothing may be cut: clamps, screws, knots.
+    pub keep_outs: Vec<KeepOut>,
     /// The small numbers that the user owns.
     pub tolerance: Tolerance,
     /// Height of rapid travel above the stock's top, mm.
@@ -482,6 +484,41 @@ pub struct Operation {
     pub plunge_mm_per_min: f64,
     /// Spindle speed, 1/min.
     pub spindle_rpm: f64,
+    /// Where it works.
+    pub within: Within,
+}
+
+/// Where an operation works.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Within {
+    /// All over the stock.
+    Stock,
+    /// Inside the outlines of some layers, or near them.
+    Layers {
+        /// Indices of the layers.
+        layers: Vec<usize>,
+        /// Wood is cut up to this and the cutter's radius outside the outlines, mm.
+        margin_mm: f64,
+    },
+}
+
+/// A rectangle in which something stands on the stock: no part of a tool comes there below `top_mm`.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct KeepOut {
+    /// Lower left corner, work coordinates, mm.
+    pub at: DVec2,
+    /// Size along X and Y, mm.
+    pub size: DVec2,
+    /// Height of what stands there above the stock's top, mm.
+    pub top_mm: f64,
+}
+
+impl KeepOut {
+    /// Its rectangle.
+    pub fn bounds(&self) -> Bounds {
+        Bounds::new(self.at, self.at + self.size)
+    }
 }
 
 /// What an operation does.

@@ -12,7 +12,7 @@ use super::keys::{
 use super::library::Library;
 use super::types::{
     Background, CutterShape, CutterSpec, Fit, Found, Job, LayerSpec, Machine, Milling, Operation,
-    OperationKind, Pattern, Place, Prune, SkeletonSpec, Stepover, SurfaceSpec, Wood,
+    OperationKind, Pattern, Place, Prune, SkeletonSpec, Stepover, SurfaceSpec, Within, Wood,
 };
 use crate::geom::{DVec2, DVec3};
 
@@ -41,12 +41,28 @@ impl Job {
         section("[relief]", &relief_lines(self));
         section("[tolerance]", &tolerance_lines(self));
         section("[safety]", &safety_lines(self));
+        for zone in &self.keep_outs {
+            let lines = [
+                ("x_mm", number(zone.at.x)),
+                ("y_mm", number(zone.at.y)),
+                ("width_mm", number(zone.size.x)),
+                ("height_mm", number(zone.size.y)),
+                ("top_mm", number(zone.top_mm)),
+            ];
+            section("[[keep_out]]", &lines);
+        }
         for layer in &self.layers {
             section("[[layer]]", &layer_lines(layer));
         }
         for operation in &self.operations {
             let mut lines = operation_lines(operation);
             lines.insert(1, ("cutter", inline(&cutter_lines(&operation.cutter))));
+            if let Within::Layers { layers, margin_mm } = &operation.within {
+                let names: Vec<String> =
+                    layers.iter().map(|&k| quoted(&self.layers[k].name)).collect();
+                lines.push(("within", format!("[{}]", names.join(", "))));
+                lines.push(("margin_mm", number(*margin_mm)));
+            }
             section("[[operation]]", &lines);
         }
         text

@@ -39,6 +39,8 @@ pub enum FailureKind {
     LowRapid,
     /// The tip goes below the stock's top beside the stock, where clamps are.
     OutsideStock,
+    /// The tool comes into a keep-out.
+    KeepOut,
     /// The program ends below safe Z, or the spindle stops while the tip is below the stock's top.
     EndInWood,
     /// The program does not end with the spindle off and M2 or M30.
@@ -179,6 +181,9 @@ fn sentence(f: &Failure) -> String {
         FailureKind::OutsideStock => format!(
             "the tip goes {a:.2} mm outside the stock's rectangle below its top, where clamps are; \
              keep the path over the stock"
+        ),
+        FailureKind::KeepOut => format!(
+            "the tool comes {a:.2} mm into a keep-out, below its top at Z {l:.2}; keep the path away or move the clamp"
         ),
         FailureKind::EndInWood => format!(
             "the program ends or stops the spindle with the tip {a:.2} mm below Z {l:.2}; \

@@ -4,7 +4,7 @@ use super::failure::{FailureKind, Finding, Ledger};
 use super::{ProgramReport, ProgramText, ProofError};
 use crate::cutter::Profile;
 use crate::gcode::read::{self, EventKind, Program};
-use crate::geom::{DVec2, DVec3, Grid, Heightfield, Move, MoveKind};
+use crate::geom::{Bounds, DVec2, DVec3, Grid, Heightfield, Move, MoveKind};
 use crate::job::{CutterSpec, Job, Operation};
 use crate::motion::Planner;
 use crate::stock::{Block, Contact};
@@ -385,8 +385,31 @@ impl Case<'_> {
         }
     }
 
+    /// No part of the tool comes into a keep-out below its top. Slanted moves count as low as they end.
+    fn check_keep_outs(&mut self, m: &Move) {
+        let cutter = self.text.cutter;
+        let low = m.from.z.min(m.to.z);
+        for zone in &self.job.keep_outs {
+            let parts = [
+                (cutter.diameter_mm, 0.0),
+                (cutter.shank_mm, cutter.flute_mm),
+                (cutter.holder_mm, cutter.stickout_mm),
+            ];
+            let inside =
+                |&(_, above_mm): &(f64, f64)| low + above_mm < zone.top_mm - LENGTH_SLACK_MM;
+            let widest = parts.iter().filter(|part| inside(part)).map(|part| part.0);
+            let radius_mm = 0.5 * widest.fold(f64::NEG_INFINITY, f64::max);
+            let away = distance_to_rectangle(m, zone.bounds());
+            if away < radius_mm - LENGTH_SLACK_MM {
+                let deep = radius_mm - away;
+                self.fail(FailureKind::KeepOut, m.line, m.to, deep, zone.top_mm);
+            }
+        }
+    }
+
     /// No way below the stock's top beside it.
     fn check_place(&mut self, m: &Move) {
+        self.check_keep_outs(m);
         let low = if m.from.z < m.to.z { m.from } else { m.to };
         if low.z >= -LENGTH_SLACK_MM {
             return;
@@ -448,6 +471,26 @@ impl Case<'_> {
         planner.sync();
         planner.times()
     }
+}
+
+/// Distance in plan of a move from a rectangle, mm; 0 where they meet.
+fn distance_to_rectangle(m: &Move, rectangle: Bounds) -> f64 {
+    let (a, b) = (m.from.truncate(), m.to.truncate());
+    // Convex along the way: the least is found by thirds.
+    let outside = |t: f64| {
+        let p = a.lerp(b, t);
+        (rectangle.min - p).max(p - rectangle.max).max(DVec2::ZERO).length()
+    };
+    let (mut low, mut high) = (0.0, 1.0);
+    for _ in 0..100 {
+        let (u, v) = (low + (high - low) / 3.0, high - (high - low) / 3.0);
+        if outside(u) <= outside(v) {
+            high = v;
+        } else {
+            low = u;
+        }
+    }
+    outside(0.5 * (low + high)).min(outside(0.0)).min(outside(1.0))
 }
 
 /// The highest rate among the axes that a move uses, mm/min.

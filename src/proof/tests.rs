@@ -6,7 +6,7 @@ use crate::gcode::read;
 use crate::geom::{DVec2, DVec3, Grid, Move, MoveKind, Tolerance};
 use crate::job::{
     ArtworkSpec, Background, CutterShape, Fit, Machine, Operation, OperationKind, Origin, Place,
-    ReliefSpec, Stepover, Stock, Wood,
+    ReliefSpec, Stepover, Stock, Within, Wood,
 };
 use crate::stock::Block;
 use proptest::prelude::*;
@@ -72,7 +72,9 @@ pub(super) fn job(cutter: CutterSpec) -> Job {
             feed_mm_per_min: 1500.0,
             plunge_mm_per_min: 300.0,
             spindle_rpm: 18000.0,
+            within: Within::Stock,
         }],
+        keep_outs: Vec::new(),
         tolerance: Tolerance::default(),
         safe_z_mm: 5.0,
         clearance_mm: 0.5,
@@ -329,6 +331,25 @@ fn a_low_rapid_is_for_carved_ground_only() {
     assert!(low(back("G0 Z-1.6", "G0 X5")), "too close to the wood");
     assert!(low(back("G0 Z2", "G0 Y10")), "clamps may stand there");
     assert!(low(back("G0 Z2", "G0 X50")), "off the stock");
+}
+
+/// The first slot runs along y = 5 with a cutter of 6 mm: a clamp whose side lies at y = 8 is grazed, one at 7.9 is hit.
+#[test]
+fn a_tool_in_a_keep_out_is_caught() {
+    let with = |y: f64, top_mm: f64| {
+        let mut job = flat_job();
+        let (at, size) = (DVec2::new(20.0, y), DVec2::new(3.0, 2.0));
+        job.keep_outs = vec![crate::job::KeepOut { at, size, top_mm }];
+        verdict(&job, &CLEAN).unwrap()
+    };
+    assert!(with(8.0, 4.0).passed());
+    let v = with(7.9, 4.0);
+    let found = v.failures.iter().find(|f| f.kind == FailureKind::KeepOut).unwrap();
+    assert_eq!((found.line, found.limit), (8, 4.0));
+    assert!((found.amount - 0.1).abs() < 1e-6, "{found}");
+    // Rapids at safe Z, 5 mm, pass over it, but not over something higher.
+    assert!(with(10.0, 4.9).passed());
+    assert!(!with(10.0, 5.2).passed());
 }
 
 #[test]

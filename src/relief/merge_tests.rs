@@ -51,6 +51,7 @@ fn job(layers: Vec<LayerSpec>) -> Job {
         relief: ReliefSpec { pitch_mm: PITCH, depth_mm: 8.0, background: Background::Clear },
         layers,
         operations: vec![],
+        keep_outs: Vec::new(),
         tolerance: Tolerance::default(),
         safe_z_mm: 5.0,
         clearance_mm: 0.5,

@@ -4,7 +4,7 @@ use crate::geom::{DVec2, DVec3, Grid, Heightfield, Tolerance};
 use crate::job::{
     ArtworkSpec, Background, Combine, CutterShape, CutterSpec, Fit, Job, LayerSpec, Machine,
     Milling, Operation, OperationKind, Origin, Pattern, Place, Profile, ReliefSpec, Selector,
-    Stepover, Stock, SurfaceSpec, Wood,
+    Stepover, Stock, SurfaceSpec, Within, Wood,
 };
 
 /// A job on a stock of this size with these operations and a shapeoko-like machine.
@@ -64,6 +64,7 @@ pub(crate) fn job(
         relief: ReliefSpec { pitch_mm, depth_mm: 5.0, background: Background::Clear },
         layers: vec![layer],
         operations,
+        keep_outs: Vec::new(),
         tolerance: Tolerance::default(),
         safe_z_mm: 5.0,
         clearance_mm: 1.0,
@@ -104,6 +105,7 @@ pub(crate) fn rough(cutter: CutterSpec, leave_mm: f64, stepdown_mm: f64) -> Oper
         feed_mm_per_min: 1500.0,
         plunge_mm_per_min: 375.0,
         spindle_rpm: 18000.0,
+        within: Within::Stock,
     }
 }
 
@@ -115,6 +117,7 @@ pub(crate) fn raster(cutter: CutterSpec, stepover: Stepover, angle_deg: f64) -> 
         feed_mm_per_min: 1200.0,
         plunge_mm_per_min: 300.0,
         spindle_rpm: 18000.0,
+        within: Within::Stock,
     }
 }
 

@@ -10,7 +10,6 @@
 //! ```
 
 use super::chain::Span;
-use super::clearance::clearance;
 use super::contours::{Cells, Edge, checked, chords, reached, runs_with};
 use super::emit::{Emitter, feed_seconds};
 use super::levels::levels;
@@ -20,7 +19,7 @@ use super::trace::{DROP_MM, LEAST_ROUNDING_MM};
 use super::travel::Travel;
 use super::{Site, ToolpathError};
 use crate::cutter::Profile;
-use crate::geom::{Bounds, DVec2, DVec3, Heightfield};
+use crate::geom::{Bounds, DVec2, DVec3, Heightfield, distance_field};
 use crate::job::Milling;
 use crate::offset::{Dropper, tip_field};
 use crate::stock::Block;
@@ -190,17 +189,17 @@ impl Level<'_> {
     fn rings(&self, site: &Site) -> Vec<Ring> {
         let grid = *self.allowed.grid();
         let stock = site.job.stock.bounds();
-        let free: Vec<bool> = (0..grid.len())
+        let blocked: Vec<bool> = (0..grid.len())
             .map(|k| {
                 let p = grid.node(k % grid.nx, k / grid.nx);
                 let inside = p.x > stock.min.x
                     && p.x < stock.max.x
                     && p.y > stock.min.y
                     && p.y < stock.max.y;
-                inside && f64::from(self.allowed.z()[k]) <= self.z
+                !(inside && f64::from(self.allowed.z()[k]) <= self.z)
             })
             .collect();
-        let mut distance = clearance(grid, &free);
+        let mut distance = distance_field(grid, &blocked);
         // The ground rises towards the walls: contours have them on their right.
         distance.z_mut().iter_mut().for_each(|d| *d = -*d);
         let deepest = -distance.range().map_or(0.0, |(low, _)| f64::from(low));

@@ -117,7 +117,7 @@ fn places(m: &Move) -> impl Iterator<Item = DVec3> + use<> {
 
 fn plan_quietly(job: &Job, target: &Heightfield) -> Vec<Toolpath> {
     let mut seen = 0;
-    let paths = plan(job, target, &mut |_| seen += 1).unwrap();
+    let paths = plan(job, &target.into(), &mut |_| seen += 1).unwrap();
     assert!(seen >= job.operations.len());
     paths
 }
@@ -177,7 +177,7 @@ proptest! {
     fn a_contour_never_gouges(bumps in bumps(SIZE, 3.0), d in prop::sample::select(vec![1.0, 3.0]), steep in 10.0f64..60.0) {
         let job = job(SIZE.x, SIZE.y, 10.0, 0.25, vec![contour(cutter(CutterShape::Ball, d), 0.02, steep)]);
         let target = relief(&job, 3.0, 0.0, &bumps);
-        let Ok(paths) = plan(&job, &target, &mut |_| {}) else { return Ok(()) };
+        let Ok(paths) = plan(&job, &(&target).into(), &mut |_| {}) else { return Ok(()) };
         assert_no_gouge(&paths, &target);
     }
 
@@ -209,7 +209,7 @@ proptest! {
         let job = job(SIZE.x, SIZE.y, 10.0, 0.25, vec![op]);
         let target = relief(&job, 4.0, 0.0, &bumps);
         let mut notes = Vec::new();
-        let Ok(paths) = plan(&job, &target, &mut |e| notes.push(e)) else { return Ok(()) };
+        let Ok(paths) = plan(&job, &(&target).into(), &mut |e| notes.push(e)) else { return Ok(()) };
         let wide = Profile::of(&paths[0].cutter).inflated(leave);
         for m in &paths[0].moves {
             for tip in places(m) {
@@ -346,7 +346,7 @@ fn waterlines_leave_no_more_than_the_scallop_on_steep_ground() {
     // Already roughed to 0.3 mm.
     let start = Heightfield::from_fn(*target.grid(), |p| ((-r(p)).max(-5.0) + 0.3).min(0.0));
     let mut block = Block::from_field(&job.stock, start.clone());
-    let paths = plan_from(&job, &target, &mut block, &mut |_| {}).unwrap();
+    let paths = plan_from(&job, &(&target).into(), &mut block, &mut |_| {}).unwrap();
     assert!(paths[0].moves.iter().filter(|m| !m.is_rapid() && m.to.z == m.from.z).count() > 100);
     for k in 0..grid.len() {
         let p = grid.node(k % grid.nx, k / grid.nx);
@@ -391,7 +391,9 @@ fn rest_roughing_keeps_to_what_the_first_cutter_left() {
         for path in &paths {
             block.cut(&Profile::of(&path.cutter), &path.moves);
         }
-        let floor = |p: DVec2| (p.y - 10.0).abs() < 1.65;
+        // Parallel passes leave up to a stepover along walls.
+        let rings = matches!(pattern, Pattern::Contour { .. });
+        let floor = |p: DVec2| (p.y - 10.0).abs() < if rings { 1.65 } else { 0.9 };
         let deep =
             (0..grid.len()).map(|k| (grid.node(k % grid.nx, k / grid.nx), block.field().z()[k]));
         // A round corner of the cutter stays in the corners of the slot.
@@ -399,6 +401,70 @@ fn rest_roughing_keeps_to_what_the_first_cutter_left() {
         let high = high.fold(f32::NEG_INFINITY, f32::max);
         assert!(high < -4.79, "{pattern:?}: {high}");
     }
+}
+
+/// An operation within a figure cuts no further than margin and radius outside, and none comes into a keep-out below its top; what may be cut is cut.
+#[test]
+fn boundaries_and_keep_outs_are_kept() {
+    use crate::job::{KeepOut, Within};
+    use crate::outline::{Figure, OutlineLayer, Outlines, Region};
+    let corner = [[8.0, 6.0], [24.0, 6.0], [24.0, 16.0], [8.0, 16.0]];
+    let outer = corner.map(DVec2::from).to_vec();
+    let figure = Figure { source: "square".into(), regions: vec![Region { outer, holes: vec![] }] };
+    let layer = OutlineLayer { name: "square".into(), figures: vec![figure] };
+    let outlines = Outlines { layers: vec![layer], notes: Vec::new() };
+    let margin_mm = 1.0;
+    let mut operations = vec![
+        rough(cutter(CutterShape::Flat, 3.0), 0.3, 1.5),
+        finish(cutter(CutterShape::Ball, 2.0), 0.02),
+    ];
+    operations[1].within = Within::Layers { layers: vec![0], margin_mm };
+    let mut job = job(32.0, 22.0, 10.0, 0.2, operations);
+    job.keep_outs =
+        vec![KeepOut { at: DVec2::new(20.0, 12.0), size: DVec2::new(9.0, 8.0), top_mm: 3.0 }];
+    let target = relief(&job, 3.0, 0.0, &[]);
+    let grounds = Grounds::new(&job, &outlines, &target);
+    let paths = plan(&job, &grounds, &mut |_| {}).unwrap();
+    assert_eq!(paths.len(), 2);
+    let zone = job.keep_outs[0].bounds();
+    let beside = |p: DVec2| (zone.min - p).max(p - zone.max).max(DVec2::ZERO).length();
+    for path in &paths {
+        for tip in path.moves.iter().flat_map(places) {
+            let clear = beside(tip.truncate()) - 0.5 * path.cutter.diameter_mm;
+            assert!(tip.z >= 3.0 || clear >= job.clearance_mm - 0.01, "{}: {tip}", path.name);
+        }
+    }
+    let outside = |p: DVec2| {
+        (DVec2::new(8.0, 6.0) - p).max(p - DVec2::new(24.0, 16.0)).max(DVec2::ZERO).length()
+    };
+    let ball = Profile::of(&paths[1].cutter);
+    let mut alone = Block::new(&job.stock, *target.grid());
+    alone.cut(&ball, &paths[1].moves);
+    let grid = *target.grid();
+    for k in 0..grid.len() {
+        let p = grid.node(k % grid.nx, k / grid.nx);
+        // The ground slopes over one cell.
+        let kept = outside(p) > margin_mm + 1.0 + 0.4 * std::f64::consts::SQRT_2;
+        assert!(!kept || alone.field().z()[k] == 0.0, "{p}");
+    }
+    let mut block = Block::new(&job.stock, *target.grid());
+    for path in &paths {
+        block.cut(&Profile::of(&path.cutter), &path.moves);
+    }
+    let reach = crate::offset::reach(&job, &grounds);
+    let mut finished = 0;
+    for k in 0..grid.len() {
+        let p = grid.node(k % grid.nx, k / grid.nx);
+        let (z, low) = (f64::from(block.field().z()[k]), f64::from(reach.z()[k]));
+        if outside(p) <= margin_mm && beside(p) > 3.0 {
+            assert!(low < -2.99 && z < -2.96, "{p}: {z} {low}");
+            finished += 1;
+        }
+        if beside(p) == 0.0 {
+            assert_eq!(z, 0.0, "{p}");
+        }
+    }
+    assert!(finished > 2000, "{finished}");
 }
 
 #[test]
@@ -441,7 +507,7 @@ fn the_same_bytes_with_one_and_two_threads() {
     let target = relief(&job, 4.0, 1.0, &[wall]);
     let run = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| plan(&job, &target, &mut |_| ()).unwrap())
+        pool.install(|| plan(&job, &(&target).into(), &mut |_| ()).unwrap())
     };
     assert_eq!(run(1), run(2));
 }
@@ -459,7 +525,7 @@ fn operations_with_one_cutter_share_a_program() {
 }
 
 fn fails(job: &Job, target: &Heightfield) -> ToolpathError {
-    plan(job, target, &mut |_| ()).unwrap_err()
+    plan(job, &target.into(), &mut |_| ()).unwrap_err()
 }
 
 #[test]
@@ -502,7 +568,7 @@ fn a_cutter_that_fits_nowhere_is_told() {
     // A pocket 6 x 3 mm: the roughing cutter is wider.
     let target = relief(&job, 2.0, 3.0, &[]);
     let mut notes = Vec::new();
-    let paths = plan(&job, &target, &mut |e| {
+    let paths = plan(&job, &(&target).into(), &mut |e| {
         if let PlanEvent::Note(n) = e {
             notes.push(n);
         }

@@ -189,7 +189,7 @@ fn a_planned_program_holds_exactly_the_planned_moves() {
         wall,
     };
     let target = fixture::relief(&job, 3.0, 0.0, &[bump(3.0, false), bump(9.0, true)]);
-    let paths = plan(&job, &target, &mut |_| ()).unwrap();
+    let paths = plan(&job, &(&target).into(), &mut |_| ()).unwrap();
     assert_eq!(paths.len(), 2);
     for path in &paths {
         let text = write(path, &["a carving".to_owned()], &job);

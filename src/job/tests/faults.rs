@@ -419,3 +419,16 @@ fn pointed_cutters_must_be_told_the_distance_of_their_passes() {
         );
     }
 }
+
+#[test]
+fn boundaries_that_cannot_be_are_refused() {
+    let zone = "[[keep_out]]\nx_mm = 1\ny_mm = 1\nwidth_mm = 5\nheight_mm = 5\ntop_mm = ";
+    let kind = |e: &JobError| matches!(e, JobError::Impossible(_));
+    refused(&with(&format!("{zone}4.5\n")), kind, (8, 10), &["4.5", "safe_z_mm", "5.5"]);
+    draft(&with(&format!("{zone}4\n"))).unwrap();
+    let within = |what: &str| with(&format!("[[operation]]\nkind = \"finish\"\nwithin = {what}\n"));
+    let form = |e: &JobError| matches!(e, JobError::WrongType(_));
+    refused(&within("\"petals\""), form, (5, 10), &["list of layers"]);
+    refused(&within("3"), form, (5, 10), &["list of layers"]);
+    draft(&within("\"artwork\"")).unwrap();
+}

@@ -31,7 +31,7 @@ fn prove_after_roughing(finishing: Operation) -> Leftover {
     let mut job = job(13.0, 9.0, 10.0, 0.2, vec![roughing, finishing]);
     job.safe_z_mm = 5.0;
     let target = relief(&job, 3.0, 0.0, &bumps());
-    let paths = plan(&job, &target, &mut |_| {}).unwrap();
+    let paths = plan(&job, &(&target).into(), &mut |_| {}).unwrap();
     let texts: Vec<String> =
         paths.iter().map(|p| crate::gcode::write::write(p, &[], &job)).collect();
     let programs: Vec<ProgramText> = paths
@@ -39,7 +39,7 @@ fn prove_after_roughing(finishing: Operation) -> Leftover {
         .zip(&texts)
         .map(|(path, text)| ProgramText { name: &path.name, text, cutter: &path.cutter })
         .collect();
-    let reach = crate::offset::reach(&job, &target);
+    let reach = crate::offset::reach(&job, &(&target).into());
     let verdict = prove(&programs, &job, &target, &reach).unwrap();
     assert!(verdict.passed(), "{shape:?}: {:#?}", verdict.failures);
     assert!(verdict.leftover.reachable.nodes > 100, "{shape:?}: {:?}", verdict.leftover);

@@ -1,15 +1,15 @@
-//! Distance of every node from the nearest one where the cutter may not go.
+//! Distance of every node of a grid from the nearest one of some of them.
 
-use crate::geom::{Grid, Heightfield};
+use super::{Grid, Heightfield};
 use rayon::prelude::*;
 
-/// The Euclidean distance of every node from the nearest node that is not `free`, mm; infinite where all are free. Exact;
+/// The Euclidean distance of every node from the nearest `seed` (by node, row-major), mm; infinite where there is none. Exact;
 /// linear in the nodes (Felzenszwalb and Huttenlocher 2012: lower envelope of parabolas, rows after columns).
-pub(super) fn clearance(grid: Grid, free: &[bool]) -> Heightfield {
+pub fn distance_field(grid: Grid, seed: &[bool]) -> Heightfield {
     let (nx, ny) = (grid.nx, grid.ny);
     // Along columns, in nodes: two sweeps a row at a time.
     let far = (nx + ny) as f32;
-    let mut along: Vec<f32> = free.iter().map(|&f| if f { far } else { 0.0 }).collect();
+    let mut along: Vec<f32> = seed.iter().map(|&s| if s { 0.0 } else { far }).collect();
     for j in 1..ny {
         let (above, below) = along.split_at_mut(j * nx);
         for (z, &before) in below[..nx].iter_mut().zip(&above[(j - 1) * nx..]) {
@@ -72,19 +72,19 @@ mod tests {
 
     proptest! {
         #[test]
-        fn it_is_the_distance_from_the_nearest_blocked_node(
-            blocked in prop::collection::vec((0usize..23, 0usize..17), 0..20),
+        fn it_is_the_distance_from_the_nearest_seed(
+            seeds in prop::collection::vec((0usize..23, 0usize..17), 0..20),
         ) {
             let grid = Grid::covering(DVec2::ZERO, 5.5, 4.0, 0.25).unwrap();
-            let mut free = vec![true; grid.len()];
-            for (i, j) in blocked {
-                free[j * grid.nx + i] = false;
+            let mut seed = vec![false; grid.len()];
+            for (i, j) in seeds {
+                seed[j * grid.nx + i] = true;
             }
-            let found = clearance(grid, &free);
+            let found = distance_field(grid, &seed);
             for j in 0..grid.ny {
                 for i in 0..grid.nx {
                     let nearest = (0..grid.len())
-                        .filter(|&k| !free[k])
+                        .filter(|&k| seed[k])
                         .map(|k| grid.node(i, j).distance(grid.node(k % grid.nx, k / grid.nx)))
                         .fold(f64::INFINITY, f64::min);
                     let got = f64::from(found.at(i, j));
