@@ -112,8 +112,12 @@ pub(super) mod rule {
     pub(in crate::job) const RING_STEPOVER: f64 = 0.7;
     /// Distance of finishing passes of a flat cutter, which leaves no cusps, as a fraction of its diameter.
     pub(in crate::job) const FLAT_STEPOVER: f64 = 0.1;
-    /// Spindle speed wanted when the job gives none, 1/min.
+    /// Spindle speed wanted when the job gives none, 1/min, for cutters of this diameter (mm) and more.
     pub(in crate::job) const SPINDLE_RPM: f64 = 18_000.0;
+    /// See [`SPINDLE_RPM`].
+    pub(in crate::job) const SPINDLE_DIAMETER_MM: f64 = 6.0;
+    /// Thinner cutters turn faster, up to this, 1/min.
+    pub(in crate::job) const THIN_SPINDLE_RPM: f64 = 24_000.0;
     /// Slowest spindle speed that a rule may choose, 1/min: below it nothing is cut.
     pub(in crate::job) const SLOWEST_RPM: f64 = 100.0;
     /// Smallest depth of a level that a rule may choose, mm.
@@ -657,7 +661,7 @@ pub(super) static OPERATION: Section = Section {
             "feed_mm_per_min",
             Kind::Number { min: 0.1, max: 60_000.0, unit: "mm/min" },
             Rule("chip load x flutes x spindle_rpm, at most the machine's speed"),
-            "speed along the path",
+            "speed along the path; ball cutters go up to twice as fast where they take little wood",
         ),
         key(
             "plunge_mm_per_min",
@@ -668,7 +672,9 @@ pub(super) static OPERATION: Section = Section {
         key(
             "spindle_rpm",
             Kind::Number { min: 100.0, max: 100_000.0, unit: "1/min" },
-            Rule("18000 within the machine's range; slower where the machine caps the feed"),
+            Rule(
+                "18000, below 6 mm up to 24000, within the machine's range; slower where the machine caps the feed",
+            ),
             "spindle speed",
         ),
     ],

@@ -49,7 +49,7 @@ pub(super) fn find(wanted: Wanted, wood: &Wood, cutter: &CutterSpec, machine: &M
     let per_turn = chip_load_mm(wood, cutter) * f64::from(cutter.flutes);
     let slowest = machine.spindle_min_rpm.max(rule::SLOWEST_RPM);
     let rpm_range = |rpm: f64| rpm.max(slowest).min(machine.spindle_max_rpm);
-    let mut spindle_rpm = wanted.spindle_rpm.unwrap_or_else(|| rpm_range(rule::SPINDLE_RPM));
+    let mut spindle_rpm = wanted.spindle_rpm.unwrap_or_else(|| rpm_range(usual_rpm(cutter)));
     let limit = feed_limit_mm_per_min(machine);
     let feed_mm_per_min = wanted.feed_mm_per_min.unwrap_or_else(|| {
         let ideal = per_turn * spindle_rpm;
@@ -62,6 +62,12 @@ pub(super) fn find(wanted: Wanted, wood: &Wood, cutter: &CutterSpec, machine: &M
         tidy((rule::PLUNGE * feed_mm_per_min).min(machine.max_rate_mm_per_min.z))
     });
     Speeds { feed_mm_per_min, plunge_mm_per_min, spindle_rpm }
+}
+
+/// Spindle speed for a cutter, 1/min: thin ones turn faster, at the same speed of the edge, up to a limit.
+fn usual_rpm(cutter: &CutterSpec) -> f64 {
+    let rpm = rule::SPINDLE_RPM * rule::SPINDLE_DIAMETER_MM / cutter.working_mm();
+    ((rpm / 1000.0).round() * 1000.0).clamp(rule::SPINDLE_RPM, rule::THIN_SPINDLE_RPM)
 }
 
 /// Rounded down to tens from 100 on, to ones from 10 on: nobody wants F1583.972.
@@ -109,6 +115,20 @@ mod tests {
         // 400 mm/min / (2 flutes x 0.044 mm) = 4545 1/min, rounded down to hundreds.
         assert_eq!(speeds.spindle_rpm, 4500.0);
         assert_eq!(speeds.plunge_mm_per_min, 100.0);
+    }
+
+    /// A ball of 3 mm has half the edge speed of 6 mm: it turns faster, up to 24000 1/min, and feeds in proportion.
+    #[test]
+    fn thin_cutters_turn_faster() {
+        let library = Library::built_in();
+        let machine = library.machine("shapeoko3").unwrap();
+        let wanted = Wanted { feed_mm_per_min: None, plunge_mm_per_min: None, spindle_rpm: None };
+        let speeds = |name: &str| find(wanted, &beech(), library.cutter(name).unwrap(), machine);
+        assert_eq!(speeds("flat-6").spindle_rpm, 18_000.0);
+        assert_eq!(speeds("ball-3").spindle_rpm, 24_000.0);
+        let ball = library.cutter("ball-3").unwrap();
+        let feed = chip_load_mm(&beech(), ball) * f64::from(ball.flutes) * 24_000.0;
+        assert!((speeds("ball-3").feed_mm_per_min - feed).abs() < 10.0);
     }
 
     #[test]

@@ -181,6 +181,9 @@ fn compare_drops(name: &str, surface: &Heightfield, profile: &Profile, count: us
     for p in points(surface, profile.radius_mm(), count) {
         let (got, want) = (dropper.drop(p), oracle(surface, profile, p));
         assert!(same(got, want), "{name}, {profile:?} at {p}: {got}, plain {want}");
+        for dz in [-0.5, -1e-7, 0.0, 1e-7, 0.5] {
+            assert_eq!(dropper.clears(p, got + dz), got <= got + dz, "{name}, {profile:?} at {p}");
+        }
         if matches!(profile, Profile::Flat { .. }) {
             let ball = Profile::Ball { radius_mm: profile.radius_mm() };
             let got = Dropper::new(surface, ball).highest_under(p);

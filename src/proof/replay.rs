@@ -56,6 +56,7 @@ pub(super) fn replay(
             program: &program,
             plunge_mm_per_min: most(|o| o.plunge_mm_per_min),
             feed_mm_per_min: most(|o| o.feed_mm_per_min),
+            operations: own,
             ledger,
         };
         reports.push(case.run(&mut block));
@@ -131,6 +132,7 @@ struct Case<'a> {
     program: &'a Program,
     plunge_mm_per_min: f64,
     feed_mm_per_min: f64,
+    operations: Vec<&'a Operation>,
     ledger: &'a mut Ledger,
 }
 
@@ -340,10 +342,22 @@ impl Case<'_> {
         self.down_mm_per_min(m) > self.plunge_mm_per_min * SPEED_SLACK
     }
 
-    /// True when the move's feed is higher than it may be in wood.
+    /// True when the move's feed is higher than it may be in wood of any thickness.
     fn races(&self, m: &Move) -> bool {
         let MoveKind::Feed { feed_mm_per_min } = m.kind else { return false };
-        feed_mm_per_min > self.feed_mm_per_min * SPEED_SLACK
+        feed_mm_per_min > self.feed_limit_mm_per_min(0.0) * SPEED_SLACK
+    }
+
+    /// True when the move's feed is higher than it may be in the wood that it met.
+    fn is_too_fast(&self, m: &Move, c: Contact) -> bool {
+        let MoveKind::Feed { feed_mm_per_min } = m.kind else { return false };
+        feed_mm_per_min > self.feed_limit_mm_per_min(f64::from(c.deepest_mm)) * SPEED_SLACK
+    }
+
+    /// Highest feed in a cut of this thickness, mm/min. Deep cuts are planned slower, but that is no law.
+    fn feed_limit_mm_per_min(&self, thickness_mm: f64) -> f64 {
+        let limit = |o: &&Operation| o.feed_limit_mm_per_min(thickness_mm).max(o.feed_mm_per_min);
+        self.operations.iter().map(limit).fold(0.0, f64::max)
     }
 
     /// Downward speed of a feed move, as fast as the machine's Z allows; 0 for others.
@@ -358,7 +372,7 @@ impl Case<'_> {
         if let Some(removed_mm) = runs.rapid.add(m.is_rapid(), m, c) {
             self.fail(FailureKind::RapidInWood, m.line, m.to, removed_mm, IN_WOOD_MM);
         }
-        let raced = runs.feed.add(self.races(m), m, c).is_some();
+        let raced = runs.feed.add(self.is_too_fast(m, c), m, c).is_some();
         if runs.plunge.add(self.plunges(m), m, c).is_some() {
             let down = self.down_mm_per_min(m);
             self.fail(FailureKind::Plunge, m.line, m.to, down, self.plunge_mm_per_min);

@@ -4,6 +4,11 @@ use super::ramp::ramp_onto;
 use super::travel::{RAMP_GAP_MM, Travel};
 use crate::geom::{DVec3, Move, MoveKind};
 use crate::job::{Job, Machine, Operation};
+use crate::stock::Contact;
+use std::collections::VecDeque;
+
+/// A feed is set by the wood that is met within this distance before and after, mm.
+const NEARBY_MM: f64 = 2.0;
 
 /// Three decimals, z rounded up: the program's text holds exactly what was planned.
 pub(super) fn on_program_grid(p: DVec3) -> DVec3 {
@@ -89,6 +94,26 @@ impl<'a> Emitter<'a> {
         }
     }
 
+    /// Sets the feeds of the moves from `first` on by the wood that they take (`contacts`, one for each), looking a little
+    /// ahead and back: where it is little the cutter goes faster, where it is deep slower.
+    pub(super) fn settle_feeds(&mut self, first: usize, contacts: &[Contact]) {
+        let moves = &self.moves[first..];
+        let thickest = thickest_nearby(moves, contacts);
+        let base = self.operation.feed_mm_per_min;
+        let speeds = moves.iter().zip(&thickest).map(|(m, &thickness_mm)| {
+            let gain = self.operation.feed_limit_mm_per_min(thickness_mm) / base;
+            // Few different speeds: in quarters.
+            let most = base * ((gain * 4.0 + 1e-9).floor() / 4.0).max(0.25);
+            feed(m.to - m.from, most, self.operation, &self.job.machine)
+        });
+        let speeds: Vec<f64> = speeds.collect();
+        for (m, feed_mm_per_min) in self.moves[first..].iter_mut().zip(speeds) {
+            if !m.is_rapid() {
+                m.kind = MoveKind::Feed { feed_mm_per_min };
+            }
+        }
+    }
+
     fn rapid(&mut self, from: DVec3, to: DVec3) {
         if from != to {
             self.moves.push(Move { from, to, kind: MoveKind::Rapid, line: 0 });
@@ -97,18 +122,47 @@ impl<'a> Emitter<'a> {
 
     fn feed(&mut self, from: DVec3, to: DVec3) -> DVec3 {
         if from != to {
-            let feed_mm_per_min = feed(to - from, self.operation, &self.job.machine);
+            let most = self.operation.feed_mm_per_min;
+            let feed_mm_per_min = feed(to - from, most, self.operation, &self.job.machine);
             self.moves.push(Move { from, to, kind: MoveKind::Feed { feed_mm_per_min }, line: 0 });
         }
         to
     }
 }
 
-/// Speed of a straight feed move, mm/min: the operation's, but so that it goes down no faster than the plunge limit
+/// The largest thickness of wood taken by each move or by moves within [`NEARBY_MM`] of way before and after it.
+fn thickest_nearby(moves: &[Move], contacts: &[Contact]) -> Vec<f64> {
+    let thickness = |k: usize| f64::from(contacts[k].deepest_mm);
+    // Greatest of a sliding window over the way (its ends by where moves begin and end).
+    let mut along = vec![0.0];
+    along.extend(moves.iter().scan(0.0, |s, m| {
+        *s += m.length_mm();
+        Some(*s)
+    }));
+    let mut window: VecDeque<usize> = VecDeque::new();
+    let mut next = 0;
+    (0..moves.len())
+        .map(|k| {
+            while next < moves.len() && along[next] <= along[k + 1] + NEARBY_MM {
+                while window.back().is_some_and(|&j| thickness(j) <= thickness(next)) {
+                    window.pop_back();
+                }
+                window.push_back(next);
+                next += 1;
+            }
+            while window.front().is_some_and(|&j| along[j + 1] < along[k] - NEARBY_MM) {
+                window.pop_front();
+            }
+            window.front().map_or(0.0, |&j| thickness(j))
+        })
+        .collect()
+}
+
+/// Speed of a straight feed move, mm/min: `most_mm_per_min`, but so that it goes down no faster than the plunge limit
 /// and no axis exceeds its highest rate; whole numbers (tens above 200), so that speeds repeat.
-fn feed(way: DVec3, operation: &Operation, machine: &Machine) -> f64 {
+fn feed(way: DVec3, most_mm_per_min: f64, operation: &Operation, machine: &Machine) -> f64 {
     let length = way.length();
-    let mut most = operation.feed_mm_per_min;
+    let mut most = most_mm_per_min;
     for axis in 0..3 {
         if way[axis] != 0.0 {
             most = most.min(machine.max_rate_mm_per_min[axis] * length / way[axis].abs());

@@ -46,7 +46,8 @@ pub(super) fn finish(
     let all = Passes { stepover_mm, angle_rad, only: None };
     let done = passes(site, &all, block, out)?;
     out.note_deep_pass(done.deepest_mm);
-    block.cut(&profile, &out.moves()[done.first..]);
+    let contacts = block.cut(&profile, &out.moves()[done.first..]);
+    out.settle_feeds(done.first, &contacts);
     let rolled = profile.rolled(LEAST_ROUNDING_MM);
     let tip = tip_field(site.target, &rolled);
     let reach = closing(&tip, &rolled);
@@ -67,7 +68,8 @@ pub(super) fn finish(
         let (stepover_mm, angle_rad) = (closer * stepover_mm, angle_rad + turn);
         let across = Passes { stepover_mm, angle_rad, only: Some(&only) };
         let done = passes(site, &across, block, out)?;
-        block.cut(&profile, &out.moves()[done.first..]);
+        let contacts = block.cut(&profile, &out.moves()[done.first..]);
+        out.settle_feeds(done.first, &contacts);
     }
     Ok(())
 }

@@ -128,7 +128,7 @@ pub(super) fn pockets(
 impl Level<'_> {
     /// True where the tip may be at this height.
     fn is_free(&self, p: DVec2) -> bool {
-        self.slim.drop(p) + self.cut.leave_mm <= self.z + DROP_MM
+        self.slim.clears(p, self.z + DROP_MM - self.cut.leave_mm)
     }
 
     /// [`Level::is_free`] far from the walls: at all corners of the cell. What a round or flat cutter could meet between
@@ -233,7 +233,7 @@ impl Level<'_> {
         let place = |path: Vec<Edge>| -> Vec<DVec2> {
             let points = path.iter().map(|edge| {
                 let (inside, outside) = edge.ends(self.allowed, self.z);
-                reached(inside, outside, |p| self.exact.drop(p) + leave_mm <= self.z)
+                reached(inside, outside, |p| self.exact.clears(p, self.z - leave_mm))
             });
             points.collect()
         };

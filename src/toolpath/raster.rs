@@ -72,9 +72,8 @@ pub(super) fn raster(
     let cut = Passes { stepover_mm, angle_rad, only: None };
     let moves = passes(site, &cut, block, out)?;
     out.note_deep_pass(moves.deepest_mm);
-    if site.later {
-        block.cut(&profile, &out.moves()[moves.first..]);
-    }
+    let contacts = block.cut(&profile, &out.moves()[moves.first..]);
+    out.settle_feeds(moves.first, &contacts);
     Ok(())
 }
 

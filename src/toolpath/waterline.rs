@@ -180,7 +180,8 @@ impl<'a> Rider<'a> {
             let touch_mm = wood.drop(chain[0].truncate());
             out.chain(&chain, touch_mm, &travel);
         }
-        block.cut(&self.profile, &out.moves()[before..]);
+        let contacts = block.cut(&self.profile, &out.moves()[before..]);
+        out.settle_feeds(before, &contacts);
     }
 }
 
@@ -212,7 +213,7 @@ impl Waterlines<'_> {
     ) -> Vec<Span> {
         let fit_mm = self.fit_mm;
         let contours = self.contours(cells, z, &cutter.exact);
-        let free = |p: DVec2| cutter.slim.drop(p) <= z + DROP_MM;
+        let free = |p: DVec2| cutter.slim.clears(p, z + DROP_MM);
         let cut = |contour: &Vec<DVec2>| {
             let runs = runs_with(contour, work);
             runs.into_iter().flat_map(|run| chords(&run, fit_mm, free)).collect::<Vec<_>>()
@@ -279,7 +280,7 @@ impl Waterlines<'_> {
         let paths = contours(self.tip, straddled.map(|c| c.node), z);
         let place = |edge: &Edge| {
             let (inside, outside) = edge.ends(self.tip, z);
-            reached(inside, outside, |p| exact.drop(p) <= z)
+            reached(inside, outside, |p| exact.clears(p, z))
         };
         paths.par_iter().map(|path| path.iter().map(place).collect()).collect()
     }
