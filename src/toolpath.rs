@@ -153,6 +153,8 @@ struct Site<'a> {
     number: usize,
     /// True while the stock is uncut.
     fresh: bool,
+    /// True when an earlier operation has finished some ground.
+    finished: bool,
     /// True when other operations follow.
     later: bool,
 }
@@ -223,6 +225,7 @@ fn plan_from(
             operation,
             number: index + 1,
             fresh: fresh && paths.is_empty(),
+            finished: job.operations[..index].iter().any(|o| kind_name(o) == "finish"),
             later: index + 1 < total,
         };
         let kind = kind_name(operation);

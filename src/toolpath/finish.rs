@@ -9,7 +9,7 @@
 
 use super::emit::Emitter;
 use super::left::Surfaces;
-use super::raster::{Passes, clear_deep_wood, passes};
+use super::raster::{Passes, clear_deep_wood, passes, passes_where_wood_is_left};
 use super::trace::LEAST_ROUNDING_MM;
 use super::waterline::{Waterlines, waterlines};
 use super::{Site, ToolpathError};
@@ -43,15 +43,17 @@ pub(super) fn finish(
     let profile = Profile::of(&site.operation.cutter);
     let stepover_mm = site.stepover_of(scallop_mm)?;
     clear_deep_wood(site, angle_rad, block, out)?;
-    let all = Passes { stepover_mm, angle_rad, only: None };
-    let done = passes(site, &all, block, out)?;
+    let limit_mm = scallop_mm + SPARE * site.job.tolerance.gouge_mm;
+    let Some(done) = passes_where_wood_is_left(site, stepover_mm, angle_rad, limit_mm, block, out)?
+    else {
+        return Ok(());
+    };
     out.note_deep_pass(done.deepest_mm);
     let contacts = block.cut(&profile, &out.moves()[done.first..]);
     out.settle_feeds(done.first, &contacts);
     let rolled = profile.rolled(LEAST_ROUNDING_MM);
     let tip = tip_field(site.target, &rolled);
     let reach = closing(&tip, &rolled);
-    let limit_mm = scallop_mm + SPARE * site.job.tolerance.gouge_mm;
     let stepover_mm = FRAC_1_SQRT_2 * stepover_mm;
     let lines = Waterlines {
         tip: &tip,

@@ -1,7 +1,10 @@
 //! Where wood is left above what the cutter can reach, and where its axis has to go to take it.
 
+use super::Site;
+use super::trace::LEAST_ROUNDING_MM;
 use crate::cutter::Profile;
 use crate::geom::{DVec2, DVec3, Grid, Heightfield};
+use crate::offset::{closing, tip_field};
 use rayon::prelude::*;
 
 /// Work is asked for this far beyond what is left, mm: room to ramp.
@@ -17,6 +20,30 @@ pub(super) struct Surfaces<'a> {
     pub(super) reach: &'a Heightfield,
     /// The wood as it is.
     pub(super) wood: &'a Heightfield,
+}
+
+/// Where an operation that comes after finishing has work.
+pub(super) enum Todo {
+    /// Everywhere: nothing has been finished before.
+    All,
+    /// Here.
+    Here(Left),
+    /// Nowhere: what stands above the limit is out of reach.
+    Nothing,
+}
+
+/// What earlier finishing has left to an operation: wood that stands more than `limit_mm` above what its cutter can
+/// reach.
+pub(super) fn todo(site: &Site, limit_mm: f64, stepover_mm: f64, wood: &Heightfield) -> Todo {
+    if !site.finished {
+        return Todo::All;
+    }
+    let profile = Profile::of(&site.operation.cutter);
+    let rolled = profile.rolled(LEAST_ROUNDING_MM);
+    let tip = tip_field(site.target, &rolled);
+    let reach = closing(&tip, &rolled);
+    let surfaces = Surfaces { tip: &tip, reach: &reach, wood };
+    surfaces.left(limit_mm, &profile, stepover_mm).map_or(Todo::Nothing, Todo::Here)
 }
 
 /// Where the cutter's axis has to pass to take away what is left.

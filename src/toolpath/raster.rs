@@ -9,6 +9,7 @@
 use super::chain::{Span, chains};
 use super::emit::{Emitter, feed_seconds};
 use super::fit::fit;
+use super::left::{Todo, todo};
 use super::order::{Direction, in_order};
 use super::rough::{Rough, rough};
 use super::rows::{Row, rim, rows, slanted_rim};
@@ -69,12 +70,37 @@ pub(super) fn raster(
         Stepover::Scallop(h) => site.stepover_of(h)?,
     };
     clear_deep_wood(site, angle_rad, block, out)?;
-    let cut = Passes { stepover_mm, angle_rad, only: None };
-    let moves = passes(site, &cut, block, out)?;
-    out.note_deep_pass(moves.deepest_mm);
-    let contacts = block.cut(&profile, &out.moves()[moves.first..]);
-    out.settle_feeds(moves.first, &contacts);
+    let limit_mm = site.job.tolerance.scallop_mm + site.job.tolerance.gouge_mm;
+    let done = passes_where_wood_is_left(site, stepover_mm, angle_rad, limit_mm, block, out)?;
+    if let Some(done) = done {
+        out.note_deep_pass(done.deepest_mm);
+        let contacts = block.cut(&profile, &out.moves()[done.first..]);
+        out.settle_feeds(done.first, &contacts);
+    }
     Ok(())
+}
+
+/// Passes over everything or, after earlier finishing, where that has left more than `limit_mm` within reach; `None` when
+/// it has left nothing.
+pub(super) fn passes_where_wood_is_left(
+    site: &Site,
+    stepover_mm: f64,
+    angle_rad: f64,
+    limit_mm: f64,
+    block: &Block,
+    out: &mut Emitter,
+) -> Result<Option<Passed>, ToolpathError> {
+    match todo(site, limit_mm, stepover_mm, block.field()) {
+        Todo::Nothing => Ok(None),
+        Todo::All => {
+            passes(site, &Passes { stepover_mm, angle_rad, only: None }, block, out).map(Some)
+        }
+        Todo::Here(left) => {
+            let only = |p: DVec2| left.cap_mm(p);
+            let cut = Passes { stepover_mm, angle_rad, only: Some(&only) };
+            passes(site, &cut, block, out).map(Some)
+        }
+    }
 }
 
 /// One set of parallel passes.

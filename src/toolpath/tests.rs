@@ -361,6 +361,31 @@ fn waterlines_leave_no_more_than_the_scallop_on_steep_ground() {
     }
 }
 
+/// After a finishing pass the same one again has nothing to do, and a thinner cutter works in the notch only.
+#[test]
+fn what_is_finished_is_not_cut_again() {
+    let ball = |d: f64| finish(cutter(CutterShape::Ball, d), 0.02);
+    let job = job(20.0, 16.0, 10.0, 0.1, vec![ball(4.0), ball(4.0), ball(1.0)]);
+    let grid = Grid::covering(DVec2::ZERO, 20.0, 16.0, 0.1).unwrap();
+    // A V of 90 degrees along x: the ball of 4 mm stays 0.83 mm above its bottom, that of 1 mm 0.21.
+    let target = Heightfield::from_fn(grid, |p| ((p.y - 8.0).abs() - 3.0).min(-1.0));
+    let mut notes = Vec::new();
+    let paths = plan(&job, &(&target).into(), &mut |e| notes.push(e)).unwrap();
+    assert_eq!(paths.len(), 2);
+    let nothing = |e: &PlanEvent| matches!(e, PlanEvent::Note(n) if n.contains("operation 2") && n.contains("nothing to cut"));
+    assert!(notes.iter().any(nothing), "{notes:?}");
+    for m in paths[1].moves.iter().filter(|m| !m.is_rapid()) {
+        assert!((m.to.y - 8.0).abs() < 2.0, "{}", m.to);
+    }
+    let mut block = Block::new(&job.stock, grid);
+    for path in &paths {
+        block.cut(&Profile::of(&path.cutter), &path.moves);
+    }
+    let along = (0..grid.nx).filter(|&i| (10..grid.nx - 10).contains(&i));
+    let high = along.map(|i| block.field().at(i, 80)).fold(f32::NEG_INFINITY, f32::max);
+    assert!(high < -3.0 + 0.21 + 0.03, "{high}");
+}
+
 /// A slot that the first cutter does not fit into: the second one works there and nowhere else, and clears it.
 #[test]
 fn rest_roughing_keeps_to_what_the_first_cutter_left() {
