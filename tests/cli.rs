@@ -467,3 +467,52 @@ fn a_failed_check_writes_nothing_and_exits_with_four() {
     desk.put("leaf.toml", text);
     refused(&desk, &["carve", "leaf.toml"], 4, &["are left above"]);
 }
+
+/// 10 mm at 600 mm/min and 400 mm/s^2: two ramps of 1/40 s, 1/8 mm each; then a second of waiting.
+const SHORT: &str = "G21 G90\nG1 X10 F600\nG4 P1\nM30\n";
+const SHORT_S: f64 = 2.0 / 40.0 + (10.0 - 2.0 / 8.0) / 10.0 + 1.0;
+
+fn json_of(out: &Output) -> serde_json::Value {
+    serde_json::from_slice(&out.stdout).unwrap()
+}
+
+#[test]
+fn time_tells_how_long_a_program_takes() {
+    let desk = Desk::new();
+    desk.put("short.nc", SHORT);
+    let out = desk.run(&["time", "short.nc", "--machine", "shapeoko3", "--json"]);
+    assert_eq!(out.status.code(), Some(0), "{}", stderr(&out));
+    let told = json_of(&out);
+    assert!((told["seconds"].as_f64().unwrap() - SHORT_S).abs() < 1e-9, "{told}");
+    assert_eq!(told["dwell_s"], 1.0);
+    let out = desk.run(&["time", "short.nc", "--machine", "shapeoko3"]);
+    let said = String::from_utf8_lossy(&out.stdout).into_owned();
+    assert!(said.contains("Shapeoko 3") && said.contains("\n2.0 s: "), "{said}");
+    // Four lines of 32 bytes at 1200 bit/s: the second one is there after 20 bytes.
+    let out = desk.run(&["time", "short.nc", "--machine", "shapeoko3", "--baud", "1200", "--json"]);
+    let slow = json_of(&out);
+    assert!((slow["starved_s"].as_f64().unwrap() - 20.0 / 120.0).abs() < 1e-9, "{slow}");
+}
+
+#[test]
+fn time_reads_a_machine_of_ones_own() {
+    let desk = Desk::new();
+    desk.put("short.nc", SHORT);
+    let mine = include_str!("../machines/shapeoko3.toml").replace("= [400,", "= [100,");
+    desk.put("mine.toml", mine);
+    let out = desk.run(&["time", "short.nc", "--machine", "mine.toml", "--json"]);
+    assert_eq!(out.status.code(), Some(0), "{}", stderr(&out));
+    // A quarter of the acceleration: each ramp takes 0.1 s and 0.5 mm.
+    let seconds = json_of(&out)["seconds"].as_f64().unwrap();
+    assert!((seconds - (0.2 + 9.0 / 10.0 + 1.0)).abs() < 1e-9, "{seconds}");
+}
+
+#[test]
+fn time_refuses_what_it_cannot_read() {
+    let desk = Desk::new();
+    desk.put("bad.nc", "G21\nG1 X1 F100\nM6 T2\n");
+    refused(&desk, &["time", "bad.nc", "--machine", "shapeoko3"], 1, &["bad.nc", "line 3", "M6"]);
+    refused(&desk, &["time", "bad.nc", "--machine", "laser9"], 1, &["laser9", "shapeoko3"]);
+    refused(&desk, &["time", "lost.nc", "--machine", "shapeoko3"], 1, &["lost.nc"]);
+    refused(&desk, &["time", "bad.nc"], 2, &["--machine"]);
+}
