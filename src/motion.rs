@@ -8,10 +8,12 @@
 
 mod limits;
 mod ring;
+mod stepper;
 mod supply;
 
 pub use limits::Limits;
 pub use ring::{Overrides, Pace, RING_BLOCKS, Ring};
+pub use stepper::Stepper;
 
 use crate::geom::{Move, MoveKind};
 use crate::job::Machine;

@@ -51,6 +51,8 @@ impl Default for Overrides {
 /// One straight block, units mm and s.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Block {
+    /// Steps of each axis, signed.
+    pub(super) steps: [i64; 3],
     pub(super) length: f64,
     pub(super) acceleration: f64,
     /// Speed wanted with the overrides, squared.
@@ -134,6 +136,7 @@ impl Ring {
         let unit = d / length;
         let rapid_rate = axis_limited(self.limits.max_rate_mm_per_min / 60.0, unit);
         let mut block = Block {
+            steps,
             length,
             acceleration: axis_limited(self.acceleration, unit),
             nominal2: 0.0,
