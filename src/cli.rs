@@ -2,6 +2,8 @@
 
 mod carve;
 mod check;
+#[cfg(unix)]
+mod controller;
 mod files;
 mod inputs;
 mod lists;
@@ -43,6 +45,9 @@ enum Command {
     New(new::Args),
     /// Tell how long a program takes on a machine, by GRBL's own planner
     Time(time::Args),
+    /// Serve a simulated GRBL 1.1h on a pseudo-terminal
+    #[cfg(unix)]
+    Controller(controller::Args),
     /// List every setting of a job file with its default
     Defaults,
     /// List the machines
@@ -81,6 +86,8 @@ pub fn main() -> ExitCode {
         Command::Check(args) => check::run(&args),
         Command::New(args) => new::run(&args),
         Command::Time(args) => time::run(&args),
+        #[cfg(unix)]
+        Command::Controller(args) => controller::run(&args),
         Command::Defaults => lists::defaults(),
         Command::Machines(args) => lists::machines(&args),
         Command::Cutters(args) => lists::cutters(&args),

@@ -12,6 +12,7 @@
 mod check;
 mod code;
 mod commands;
+mod faults;
 mod modal;
 mod realtime;
 mod report;
@@ -20,11 +21,13 @@ mod store;
 mod words;
 
 pub use code::Refusal;
+pub use faults::Fault;
 pub use store::Store;
 
 use crate::geom::DVec3;
 use crate::motion::{Ring, Stepper};
 use code::Alarm;
+use faults::Faults;
 use modal::{Modal, Probe, Spindle};
 use realtime::Flags;
 use report::Due;
@@ -183,6 +186,7 @@ pub struct Controller {
     probing: Option<Probe>,
     probed: [i64; 3],
     probe_met: bool,
+    faults: Faults,
 }
 
 impl Controller {
@@ -220,6 +224,7 @@ impl Controller {
             probing: None,
             probed: [0; 3],
             probe_met: false,
+            faults: Faults::default(),
         };
         if std::mem::take(&mut controller.store.blank) {
             controller.say(&Refusal::EepromRead.to_string());
@@ -231,6 +236,9 @@ impl Controller {
 
     /// Puts bytes on the wire; they arrive one after the other at 115200 baud.
     pub fn feed(&mut self, bytes: &[u8]) {
+        if self.faults.unplugged {
+            return;
+        }
         let mut at_s = self.wire.back().map_or(self.now_s, |(at_s, _)| *at_s);
         for &byte in bytes {
             at_s += 1.0 / WIRE_BYTES_PER_S;
@@ -260,6 +268,7 @@ impl Controller {
                 }
             }
             self.watch_probe();
+            self.release_held();
             self.poll();
             if self.now_s >= end_s {
                 return;
@@ -357,6 +366,16 @@ impl Controller {
         }
     }
 
+    /// True while the motors turn.
+    pub fn is_in_motion(&self) -> bool {
+        !self.stepper.is_idle()
+    }
+
+    /// True after [`Fault::PortLoss`].
+    pub fn is_unplugged(&self) -> bool {
+        self.faults.unplugged
+    }
+
     fn is_moving(&self) -> bool {
         match self.state {
             State::Run | State::Jog => true,
@@ -378,6 +397,9 @@ impl Controller {
             && !self.is_suspended()
         {
             next_s = next_s.min(self.now_s + seconds);
+        }
+        if let Some(at_s) = self.held_until_s() {
+            next_s = next_s.min(at_s);
         }
         if let Some(seconds) = self.stepper.next_s() {
             next_s = next_s.min(self.now_s + seconds);
@@ -481,7 +503,7 @@ impl Controller {
             text => self.obey(text),
         };
         match done {
-            Ok(()) if self.tasks.is_empty() => self.say("ok"),
+            Ok(()) if self.tasks.is_empty() => self.say_ok(),
             Ok(()) => self.tasks.push_back(Task::Ok),
             Err(refusal) => self.say(&refusal.to_string()),
         }

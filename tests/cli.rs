@@ -516,3 +516,96 @@ fn time_refuses_what_it_cannot_read() {
     refused(&desk, &["time", "lost.nc", "--machine", "shapeoko3"], 1, &["lost.nc"]);
     refused(&desk, &["time", "bad.nc"], 2, &["--machine"]);
 }
+
+/// A simulated controller in the background; ends with the test.
+#[cfg(unix)]
+struct Served {
+    child: std::process::Child,
+    port: std::fs::File,
+    heard: std::sync::mpsc::Receiver<u8>,
+}
+
+#[cfg(unix)]
+impl Served {
+    fn start(desk: &Desk, args: &[&str]) -> Self {
+        use std::io::{BufRead, BufReader, Read};
+        let mut child = std::process::Command::new(assert_cmd::cargo::cargo_bin("relievo"))
+            .current_dir(desk.dir.path())
+            .arg("controller")
+            .args(args)
+            .stdout(std::process::Stdio::piped())
+            .spawn()
+            .unwrap();
+        let mut name = String::new();
+        BufReader::new(child.stdout.take().unwrap()).read_line(&mut name).unwrap();
+        let open = || std::fs::OpenOptions::new().read(true).write(true).open(name.trim());
+        let (port, mut reading) = (open().unwrap(), open().unwrap());
+        let (send, heard) = std::sync::mpsc::channel();
+        std::thread::spawn(move || {
+            let mut byte = [0];
+            while matches!(reading.read(&mut byte), Ok(1)) && send.send(byte[0]).is_ok() {}
+        });
+        Self { child, port, heard }
+    }
+
+    /// Sends text and waits for an answer with `end` in it.
+    fn ask(&mut self, text: &str, end: &str) -> String {
+        use std::io::Write;
+        self.port.write_all(text.as_bytes()).unwrap();
+        let mut said = String::new();
+        while !said.contains(end) {
+            let byte = self.heard.recv_timeout(std::time::Duration::from_secs(60));
+            said.push(char::from(byte.unwrap_or_else(|e| panic!("{e} after {said:?}"))));
+        }
+        said
+    }
+}
+
+#[cfg(unix)]
+impl Drop for Served {
+    fn drop(&mut self) {
+        self.child.kill().ok();
+        self.child.wait().ok();
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn the_simulated_controller_answers_on_a_terminal() {
+    let desk = Desk::new();
+    desk.put("mine.txt", "# my router\n$20=1\n$22=1\n$110=3000\n");
+    let args = ["--settings", "mine.txt", "--log", "talk.txt", "--speed", "50"];
+    let mut served = Served::start(&desk, &args);
+    served.ask("\x18", "unlock]\r\n");
+    served.ask("$X\n", "ok\r\n");
+    assert!(served.ask("$$\n", "ok\r\n").contains("$110=3000.000\r\n"));
+    assert_eq!(served.ask("$120=77\n", "ok\r\n"), "ok\r\n");
+    assert_eq!(served.ask("G1X-1F600\n", "ok\r\n"), "ok\r\n");
+    while !served.ask("?", ">").contains("<Idle|MPos:-1.000,0.000,0.000|") {}
+    let log = std::fs::read_to_string(desk.dir.path().join("talk.txt")).unwrap();
+    assert!(log.contains(" > $X\\n") && log.contains(" < ok\\r\\n"), "{log}");
+    let kept = std::fs::read_to_string(desk.dir.path().join("mine.txt")).unwrap();
+    assert!(kept.contains("$120=77\n") && kept.contains("$110=3000\n"), "{kept}");
+}
+
+#[cfg(unix)]
+#[test]
+fn the_simulated_controller_fails_on_request() {
+    let desk = Desk::new();
+    let args = ["--speed", "100", "--fault", "banner@30", "--fault", "port-loss@60"];
+    let mut served = Served::start(&desk, &args);
+    served.ask("", "Grbl 1.1h ['$' for help]\r\n");
+    served.ask("", "Grbl 1.1h ['$' for help]\r\n");
+    // The port is gone, and with nothing to run so is the controller.
+    assert_eq!(served.child.wait().unwrap().code(), Some(0));
+}
+
+#[test]
+fn the_simulated_controller_refuses_what_it_cannot_have() {
+    let desk = Desk::new();
+    desk.put("bad.txt", "$110=5000\n$20=1\n");
+    if cfg!(unix) {
+        refused(&desk, &["controller", "--settings", "bad.txt"], 1, &["bad.txt:2", "error:10"]);
+        refused(&desk, &["controller", "--fault", "fire@3"], 2, &["fire", "drop-ok"]);
+    }
+}

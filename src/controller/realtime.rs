@@ -100,7 +100,7 @@ impl Controller {
     /// The reset takes place: a line in execution is answered once more, then the firmware starts afresh.
     pub(super) fn restart(&mut self) {
         if self.tasks.contains(&Task::Ok) {
-            self.say("ok");
+            self.say_ok();
         }
         self.deaf = false;
         self.tasks.clear();

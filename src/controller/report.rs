@@ -37,8 +37,7 @@ pub(super) struct Due {
 
 impl Controller {
     pub(super) fn say(&mut self, text: &str) {
-        self.out.extend_from_slice(text.as_bytes());
-        self.out.extend_from_slice(b"\r\n");
+        self.emit(format!("{text}\r\n").as_bytes());
     }
 
     pub(super) fn feedback(&mut self, text: &str) {
@@ -46,7 +45,7 @@ impl Controller {
     }
 
     pub(super) fn banner(&mut self) {
-        self.out.extend_from_slice(b"\r\nGrbl 1.1h ['$' for help]\r\n");
+        self.emit(b"\r\nGrbl 1.1h ['$' for help]\r\n");
     }
 
     fn inches(&self) -> bool {

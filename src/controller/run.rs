@@ -242,7 +242,7 @@ impl Controller {
                 return true;
             }
             Task::Say(text) => self.say(&text),
-            Task::Ok => self.say("ok"),
+            Task::Ok => self.say_ok(),
         }
         self.tasks.pop_front();
         true

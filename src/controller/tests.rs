@@ -213,6 +213,68 @@ fn startup_lines_run_after_the_banner() {
     assert!(after(&mut c, b"$G\n", 0.2).contains("[GC:G0 G55 G17 G21 G91 "));
 }
 
+#[test]
+fn an_ok_can_be_dropped_garbled_split_and_doubled() {
+    for (fault, at_once, later) in [
+        (Fault::DropOk, "", ""),
+        (Fault::GarbleOk, "oj\r\n", ""),
+        (Fault::SplitOk, "o", "k\r\n"),
+        (Fault::DoubleOk, "ok\r\nok\r\n", ""),
+    ] {
+        let mut c = quick();
+        c.inject(fault);
+        assert_eq!(after(&mut c, b"G21\n", 0.1), at_once, "{fault:?}");
+        assert_eq!(after(&mut c, b"", 1.0), later, "{fault:?}");
+        assert_eq!(after(&mut c, b"G21\n", 0.1), "ok\r\n", "{fault:?}");
+    }
+}
+
+#[test]
+fn a_banner_may_come_by_itself() {
+    let mut c = quick();
+    after(&mut c, b"G20G1X4F20\n", 1.0);
+    c.inject(Fault::Banner);
+    assert_eq!(after(&mut c, b"", 0.1), "\r\nGrbl 1.1h ['$' for help]\r\n");
+    assert!(after(&mut c, b"$G\n", 0.1).contains("G21"));
+    let x = c.position_mm().x;
+    c.advance(1.0);
+    assert_eq!(c.position_mm().x, x);
+}
+
+#[test]
+fn without_its_port_the_machine_runs_what_it_holds() {
+    let mut c = quick();
+    after(&mut c, b"G1X10F600\n", 0.2);
+    c.inject(Fault::PortLoss);
+    assert_eq!(after(&mut c, b"\x18?G0X0\n", 5.0), "");
+    assert_eq!(c.position_mm(), DVec3::X * 10.0);
+}
+
+#[test]
+fn a_silent_controller_still_obeys() {
+    let mut c = quick();
+    c.inject(Fault::Silence);
+    assert_eq!(after(&mut c, b"?G1X1F600\n", 2.0), "");
+    assert_eq!(c.position_mm(), DVec3::X);
+}
+
+#[test]
+fn a_slow_parser_gets_through_250_lines_a_second() {
+    let mut c = quick();
+    c.inject(Fault::SlowParser);
+    let said = after(&mut c, "\n".repeat(100).as_bytes(), 0.2);
+    assert_eq!(said.matches("ok").count(), 49); // the first one comes a byte late
+}
+
+#[test]
+fn what_the_transmit_ring_cannot_hold_is_lost() {
+    let mut c = quick();
+    c.inject(Fault::TxOverrun);
+    // All settings are said at once: more than 104 bytes.
+    assert_eq!(after(&mut c, b"$$\n", 0.1).len(), 104);
+    assert_eq!(after(&mut c, b"\n", 0.1), "ok\r\n");
+}
+
 proptest! {
     /// Whatever comes over the wire, the controller goes on; a reset always brings it back.
     #[test]
