@@ -187,6 +187,7 @@ pub struct Controller {
     probed: [i64; 3],
     probe_met: bool,
     faults: Faults,
+    lost_bytes: u64,
 }
 
 impl Controller {
@@ -225,6 +226,7 @@ impl Controller {
             probed: [0; 3],
             probe_met: false,
             faults: Faults::default(),
+            lost_bytes: 0,
         };
         if std::mem::take(&mut controller.store.blank) {
             controller.say(&Refusal::EepromRead.to_string());
@@ -322,6 +324,8 @@ impl Controller {
     fn receive(&mut self, byte: u8) {
         if self.rx.len() < RX_BYTES {
             self.rx.push_back(byte);
+        } else {
+            self.lost_bytes += 1;
         }
     }
 
@@ -369,6 +373,11 @@ impl Controller {
     /// True while the motors turn.
     pub fn is_in_motion(&self) -> bool {
         !self.stepper.is_idle()
+    }
+
+    /// Bytes that came when the receive ring was full. The firmware does not tell; a simulation can.
+    pub fn lost_bytes(&self) -> u64 {
+        self.lost_bytes
     }
 
     /// True after [`Fault::PortLoss`].
