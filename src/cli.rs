@@ -2,6 +2,8 @@
 
 mod carve;
 mod check;
+#[cfg(unix)]
+mod controller;
 mod files;
 mod inputs;
 mod lists;
@@ -9,6 +11,7 @@ mod memory;
 mod new;
 mod observe;
 mod outcome;
+mod time;
 
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
@@ -40,6 +43,11 @@ enum Command {
     Check(check::Args),
     /// Write a commented job file for artwork, one layer for each colour found
     New(new::Args),
+    /// Tell how long a program takes on a machine, by GRBL's own planner
+    Time(time::Args),
+    /// Serve a simulated GRBL 1.1h on a pseudo-terminal
+    #[cfg(unix)]
+    Controller(controller::Args),
     /// List every setting of a job file with its default
     Defaults,
     /// List the machines
@@ -77,6 +85,9 @@ pub fn main() -> ExitCode {
         Command::Carve(args) => carve::run(&args),
         Command::Check(args) => check::run(&args),
         Command::New(args) => new::run(&args),
+        Command::Time(args) => time::run(&args),
+        #[cfg(unix)]
+        Command::Controller(args) => controller::run(&args),
         Command::Defaults => lists::defaults(),
         Command::Machines(args) => lists::machines(&args),
         Command::Cutters(args) => lists::cutters(&args),

@@ -1,21 +1,24 @@
 //! Plain moves, one after another -> time, speed, position: GRBL's planner as a model, incremental.
 //!
-//! The model is that of GRBL 1.1: speeds and accelerations limited axis by axis, junction speeds by the
-//! junction deviation, trapezoids of constant acceleration, and a ring of 15 blocks whose last one ends at rest.
-//! A block's exit speed is settled when the ring is full (or drained), with what the ring then knows.
+//! The model is that of GRBL 1.1: whole steps, speeds and accelerations limited axis by axis, junction speeds by
+//! the junction deviation, trapezoids of constant acceleration, and a ring of 15 blocks whose last one ends at rest
+//! ([`Ring`]). [`Planner`] tells how long a program takes: a block's exit speed is settled when the ring is full
+//! (or drained), with what the ring then knows; a ring is always full unless the serial line cannot keep up
+//! ([`Planner::with_baud`]).
 
-use crate::geom::{DVec3, Move, MoveKind};
+mod limits;
+mod ring;
+mod stepper;
+mod supply;
+
+pub use limits::Limits;
+pub use ring::{Overrides, Pace, RING_BLOCKS, Ring};
+pub use stepper::Stepper;
+
+use crate::geom::{Move, MoveKind};
 use crate::job::Machine;
-use std::collections::VecDeque;
-
-/// Blocks that GRBL's planner holds, the running one included.
-const RING_BLOCKS: usize = 15;
-
-/// Below this the firmware lifts a feed to it, mm/min.
-const MIN_FEED_MM_PER_MIN: f64 = 1.0;
-
-/// Moves shorter than this are no block at all, mm.
-const MIN_BLOCK_MM: f64 = 1e-9;
+use ring::Block;
+use supply::Supply;
 
 /// Where the time goes, s.
 #[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize)]
@@ -35,74 +38,61 @@ impl Times {
     }
 }
 
-/// One straight block, units mm and s.
-#[derive(Debug, Clone, Copy)]
-struct Block {
-    length: f64,
-    acceleration: f64,
-    /// Speed wanted, squared.
-    nominal2: f64,
-    /// Highest entry speed that the junction and both nominal speeds allow, squared.
-    max_entry2: f64,
-    rapid: bool,
-}
-
 /// GRBL's planner, fed move by move.
 #[derive(Debug, Clone)]
 pub struct Planner {
-    max_rate: DVec3,
-    acceleration: DVec3,
-    junction_deviation_mm: f64,
-    ring: VecDeque<Block>,
+    ring: Ring,
     /// Settled entry speed of the oldest block, squared.
     entry2: f64,
-    /// Direction and squared nominal speed of the newest block; `None` at rest.
-    last: Option<(DVec3, f64)>,
     times: Times,
+    supply: Option<Supply>,
+    /// When the line being obeyed was there, s.
+    arrived_s: f64,
+    /// At rest because the next line was not there, s.
+    starved_s: f64,
 }
 
 impl Planner {
-    /// A planner at rest.
+    /// A planner at rest whose lines are always there in time.
     pub fn new(machine: &Machine) -> Self {
         Self {
-            max_rate: machine.max_rate_mm_per_min / 60.0,
-            acceleration: machine.acceleration_mm_per_s2,
-            junction_deviation_mm: machine.junction_deviation_mm,
-            ring: VecDeque::with_capacity(RING_BLOCKS),
+            ring: Ring::new(Limits::from(machine)),
             entry2: 0.0,
-            last: None,
             times: Times::default(),
+            supply: None,
+            arrived_s: 0.0,
+            starved_s: 0.0,
+        }
+    }
+
+    /// A planner at rest whose lines come over a serial line of this speed, bit/s, as [`Planner::line`] tells.
+    pub fn with_baud(machine: &Machine, baud: f64) -> Self {
+        Self { supply: Some(Supply::new(baud)), ..Self::new(machine) }
+    }
+
+    /// The next line of the program, with this many bytes (its end included), comes before what follows.
+    pub fn line(&mut self, bytes: usize) {
+        let now_s = self.clock_s();
+        if let Some(supply) = &mut self.supply {
+            // The controller takes a line out as soon as its parser is free: the block before it has gone in.
+            self.arrived_s = supply.arrival_s(bytes, now_s);
+            self.run_until_arrival();
         }
     }
 
     /// Adds a move; the oldest block leaves when the ring is full.
     pub fn push(&mut self, mv: &Move) {
-        let d = mv.to - mv.from;
-        let length = d.length();
-        if length.is_nan() || length <= MIN_BLOCK_MM {
+        if !(mv.from.is_finite() && mv.to.is_finite()) {
             return;
         }
-        let unit = d / length;
-        let rapid_rate = axis_limited(self.max_rate, unit);
-        let nominal = match mv.kind {
-            MoveKind::Rapid => rapid_rate,
-            MoveKind::Feed { feed_mm_per_min } => {
-                (feed_mm_per_min.max(MIN_FEED_MM_PER_MIN) / 60.0).min(rapid_rate)
-            }
+        let limits = self.ring.limits();
+        let (from, to) = (limits.steps(mv.from), limits.steps(mv.to));
+        let pace = match mv.kind {
+            MoveKind::Rapid => Pace::Rapid,
+            MoveKind::Feed { feed_mm_per_min } => Pace::Feed(feed_mm_per_min / 60.0),
         };
-        let nominal2 = nominal * nominal;
-        let max_entry2 = self.last.map_or(0.0, |(before, before_nominal2)| {
-            self.junction_speed2(before, unit).min(nominal2).min(before_nominal2)
-        });
-        self.last = Some((unit, nominal2));
-        self.ring.push_back(Block {
-            length,
-            acceleration: axis_limited(self.acceleration, unit),
-            nominal2,
-            max_entry2,
-            rapid: mv.is_rapid(),
-        });
-        if self.ring.len() == RING_BLOCKS {
+        let steps = std::array::from_fn(|k| to[k] - from[k]);
+        if self.ring.push(steps, pace) && self.ring.is_full() {
             self.settle_oldest();
         }
     }
@@ -119,7 +109,6 @@ impl Planner {
             self.settle_oldest();
         }
         self.entry2 = 0.0;
-        self.last = None;
     }
 
     /// Where the time of all settled blocks went; everything pushed is settled after [`Planner::sync`].
@@ -127,36 +116,41 @@ impl Planner {
         self.times
     }
 
+    /// Time at rest because the serial line was too slow, s; 0 without [`Planner::with_baud`].
+    pub fn starved_s(&self) -> f64 {
+        self.starved_s
+    }
+
     /// Runs to a stop and gives the time of everything, s.
     pub fn finish(mut self) -> f64 {
         self.sync();
-        self.times.total_s()
+        self.times.total_s() + self.starved_s
     }
 
-    /// Highest speed through the corner between two directions, squared (junction deviation, Jeon 2011).
-    fn junction_speed2(&self, before: DVec3, after: DVec3) -> f64 {
-        let cos = -before.dot(after);
-        if cos > 0.999_999 {
-            return 0.0;
+    /// When the oldest block begins, s.
+    fn clock_s(&self) -> f64 {
+        self.times.total_s() + self.starved_s
+    }
+
+    /// Settles the blocks that are over before the line that is awaited is there.
+    fn run_until_arrival(&mut self) {
+        while let Some(block) = self.ring.front().copied() {
+            let exit2 = self.ring.exit2(self.entry2, block.length);
+            if self.clock_s() + trapezoid_s(&block, self.entry2, exit2) > self.arrived_s {
+                return;
+            }
+            self.settle_oldest();
         }
-        if cos < -0.999_999 {
-            return f64::INFINITY;
-        }
-        let sin_half = (0.5 * (1.0 - cos)).sqrt();
-        let a = axis_limited(self.acceleration, (after - before).normalize_or_zero());
-        (a * self.junction_deviation_mm * sin_half / (1.0 - sin_half)).max(0.0)
+        self.entry2 = 0.0;
+        self.starved_s += (self.arrived_s - self.clock_s()).max(0.0);
     }
 
     /// Fixes the exit speed of the oldest block with all the ring knows, adds its time and lets it go.
     fn settle_oldest(&mut self) {
-        let mut exit2 = 0.0_f64;
-        for b in self.ring.iter().skip(1).rev() {
-            exit2 = b.max_entry2.min(exit2 + 2.0 * b.acceleration * b.length);
-        }
-        let Some(block) = self.ring.pop_front() else { return };
-        let exit2 = exit2.min(self.entry2 + 2.0 * block.acceleration * block.length);
+        let exit2 = self.ring.front().map_or(0.0, |b| self.ring.exit2(self.entry2, b.length));
+        let Some(block) = self.ring.pop() else { return };
         let seconds = trapezoid_s(&block, self.entry2, exit2);
-        if block.rapid {
+        if block.is_rapid() {
             self.times.rapid_s += seconds;
         } else {
             self.times.feed_s += seconds;
@@ -175,12 +169,6 @@ fn trapezoid_s(b: &Block, entry2: f64, exit2: f64) -> f64 {
     let ramps_s = (2.0 * top - v0 - v1) / a;
     let ramps_mm = (2.0 * top2 - entry2 - exit2) / (2.0 * a);
     ramps_s + (b.length - ramps_mm).max(0.0) / top
-}
-
-/// The largest speed (or acceleration) along `unit` that keeps every axis within its limit.
-fn axis_limited(limit: DVec3, unit: DVec3) -> f64 {
-    let on = |limit: f64, u: f64| if u == 0.0 { f64::INFINITY } else { limit / u.abs() };
-    on(limit.x, unit.x).min(on(limit.y, unit.y)).min(on(limit.z, unit.z))
 }
 
 /// Time that the machine takes for `moves` from rest to rest, s.

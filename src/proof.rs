@@ -12,10 +12,12 @@ mod distance;
 mod failure;
 mod oracle;
 mod replay;
+mod time;
 mod walls;
 
 pub use deviation::{Gouge, Leftover, Quantiles};
 pub use failure::{Failure, FailureKind};
+pub use time::run as run_time;
 
 use crate::gcode::read::ReadError;
 use crate::geom::Heightfield;

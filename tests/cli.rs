@@ -467,3 +467,145 @@ fn a_failed_check_writes_nothing_and_exits_with_four() {
     desk.put("leaf.toml", text);
     refused(&desk, &["carve", "leaf.toml"], 4, &["are left above"]);
 }
+
+/// 10 mm at 600 mm/min and 400 mm/s^2: two ramps of 1/40 s, 1/8 mm each; then a second of waiting.
+const SHORT: &str = "G21 G90\nG1 X10 F600\nG4 P1\nM30\n";
+const SHORT_S: f64 = 2.0 / 40.0 + (10.0 - 2.0 / 8.0) / 10.0 + 1.0;
+
+fn json_of(out: &Output) -> serde_json::Value {
+    serde_json::from_slice(&out.stdout).unwrap()
+}
+
+#[test]
+fn time_tells_how_long_a_program_takes() {
+    let desk = Desk::new();
+    desk.put("short.nc", SHORT);
+    let out = desk.run(&["time", "short.nc", "--machine", "shapeoko3", "--json"]);
+    assert_eq!(out.status.code(), Some(0), "{}", stderr(&out));
+    let told = json_of(&out);
+    assert!((told["seconds"].as_f64().unwrap() - SHORT_S).abs() < 1e-9, "{told}");
+    assert_eq!(told["dwell_s"], 1.0);
+    let out = desk.run(&["time", "short.nc", "--machine", "shapeoko3"]);
+    let said = String::from_utf8_lossy(&out.stdout).into_owned();
+    assert!(said.contains("Shapeoko 3") && said.contains("\n2.0 s: "), "{said}");
+    // Four lines of 32 bytes at 1200 bit/s: the second one is there after 20 bytes.
+    let out = desk.run(&["time", "short.nc", "--machine", "shapeoko3", "--baud", "1200", "--json"]);
+    let slow = json_of(&out);
+    assert!((slow["starved_s"].as_f64().unwrap() - 20.0 / 120.0).abs() < 1e-9, "{slow}");
+}
+
+#[test]
+fn time_reads_a_machine_of_ones_own() {
+    let desk = Desk::new();
+    desk.put("short.nc", SHORT);
+    let mine = include_str!("../machines/shapeoko3.toml").replace("= [400,", "= [100,");
+    desk.put("mine.toml", mine);
+    let out = desk.run(&["time", "short.nc", "--machine", "mine.toml", "--json"]);
+    assert_eq!(out.status.code(), Some(0), "{}", stderr(&out));
+    // A quarter of the acceleration: each ramp takes 0.1 s and 0.5 mm.
+    let seconds = json_of(&out)["seconds"].as_f64().unwrap();
+    assert!((seconds - (0.2 + 9.0 / 10.0 + 1.0)).abs() < 1e-9, "{seconds}");
+}
+
+#[test]
+fn time_refuses_what_it_cannot_read() {
+    let desk = Desk::new();
+    desk.put("bad.nc", "G21\nG1 X1 F100\nM6 T2\n");
+    refused(&desk, &["time", "bad.nc", "--machine", "shapeoko3"], 1, &["bad.nc", "line 3", "M6"]);
+    refused(&desk, &["time", "bad.nc", "--machine", "laser9"], 1, &["laser9", "shapeoko3"]);
+    refused(&desk, &["time", "lost.nc", "--machine", "shapeoko3"], 1, &["lost.nc"]);
+    refused(&desk, &["time", "bad.nc"], 2, &["--machine"]);
+}
+
+/// A simulated controller in the background; ends with the test.
+#[cfg(unix)]
+struct Served {
+    child: std::process::Child,
+    port: std::fs::File,
+    heard: std::sync::mpsc::Receiver<u8>,
+}
+
+#[cfg(unix)]
+impl Served {
+    fn start(desk: &Desk, args: &[&str]) -> Self {
+        use std::io::{BufRead, BufReader, Read};
+        let mut child = std::process::Command::new(assert_cmd::cargo::cargo_bin("relievo"))
+            .current_dir(desk.dir.path())
+            .arg("controller")
+            .args(args)
+            .stdout(std::process::Stdio::piped())
+            .spawn()
+            .unwrap();
+        let mut name = String::new();
+        BufReader::new(child.stdout.take().unwrap()).read_line(&mut name).unwrap();
+        let open = || std::fs::OpenOptions::new().read(true).write(true).open(name.trim());
+        let (port, mut reading) = (open().unwrap(), open().unwrap());
+        let (send, heard) = std::sync::mpsc::channel();
+        std::thread::spawn(move || {
+            let mut byte = [0];
+            while matches!(reading.read(&mut byte), Ok(1)) && send.send(byte[0]).is_ok() {}
+        });
+        Self { child, port, heard }
+    }
+
+    /// Sends text and waits for an answer with `end` in it.
+    fn ask(&mut self, text: &str, end: &str) -> String {
+        use std::io::Write;
+        self.port.write_all(text.as_bytes()).unwrap();
+        let mut said = String::new();
+        while !said.contains(end) {
+            let byte = self.heard.recv_timeout(std::time::Duration::from_secs(60));
+            said.push(char::from(byte.unwrap_or_else(|e| panic!("{e} after {said:?}"))));
+        }
+        said
+    }
+}
+
+#[cfg(unix)]
+impl Drop for Served {
+    fn drop(&mut self) {
+        self.child.kill().ok();
+        self.child.wait().ok();
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn the_simulated_controller_answers_on_a_terminal() {
+    let desk = Desk::new();
+    desk.put("mine.txt", "# my router\n$20=1\n$22=1\n$110=3000\n");
+    let args = ["--settings", "mine.txt", "--log", "talk.txt", "--speed", "50"];
+    let mut served = Served::start(&desk, &args);
+    served.ask("\x18", "unlock]\r\n");
+    served.ask("$X\n", "ok\r\n");
+    assert!(served.ask("$$\n", "ok\r\n").contains("$110=3000.000\r\n"));
+    assert_eq!(served.ask("$120=77\n", "ok\r\n"), "ok\r\n");
+    assert_eq!(served.ask("G1X-1F600\n", "ok\r\n"), "ok\r\n");
+    while !served.ask("?", ">").contains("<Idle|MPos:-1.000,0.000,0.000|") {}
+    let log = std::fs::read_to_string(desk.dir.path().join("talk.txt")).unwrap();
+    assert!(log.contains(" > $X\\n") && log.contains(" < ok\\r\\n"), "{log}");
+    let kept = std::fs::read_to_string(desk.dir.path().join("mine.txt")).unwrap();
+    assert!(kept.contains("$120=77\n") && kept.contains("$110=3000\n"), "{kept}");
+}
+
+#[cfg(unix)]
+#[test]
+fn the_simulated_controller_fails_on_request() {
+    let desk = Desk::new();
+    let args = ["--speed", "100", "--fault", "banner@30", "--fault", "port-loss@60"];
+    let mut served = Served::start(&desk, &args);
+    served.ask("", "Grbl 1.1h ['$' for help]\r\n");
+    served.ask("", "Grbl 1.1h ['$' for help]\r\n");
+    // The port is gone, and with nothing to run so is the controller.
+    assert_eq!(served.child.wait().unwrap().code(), Some(0));
+}
+
+#[test]
+fn the_simulated_controller_refuses_what_it_cannot_have() {
+    let desk = Desk::new();
+    desk.put("bad.txt", "$110=5000\n$20=1\n");
+    if cfg!(unix) {
+        refused(&desk, &["controller", "--settings", "bad.txt"], 1, &["bad.txt:2", "error:10"]);
+        refused(&desk, &["controller", "--fault", "fire@3"], 2, &["fire", "drop-ok"]);
+    }
+}

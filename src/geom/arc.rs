@@ -42,10 +42,14 @@ pub enum Turn {
     CounterClockwise,
 }
 
+/// Chords that the firmware turns on by the series of the rotation before it takes sine and cosine again.
+const CHORDS_BY_SERIES: usize = 12;
+
 /// End points of the chords of an arc from `from` to `to` round `center`, the last one being `to`.
 ///
 /// The number of chords is GRBL's, from the arc tolerance `$12`: chord length
-/// `2 sqrt(tol (2 r - tol))`, at least one chord. Start and end at the same place make a full circle.
+/// `2 sqrt(tol (2 r - tol))`, at least one chord. Start and end at the same place make a full circle. As in the
+/// firmware each chord turns the last radius by a third-order series of the rotation, and every 13th is exact.
 pub fn chords(
     plane: Plane,
     turn: Turn,
@@ -68,11 +72,20 @@ pub fn chords(
     let n = if chord > 0.0 { (0.5 * angle * radius / (0.5 * chord)).abs().floor() } else { 0.0 };
     let n = (n as usize).clamp(1, 1_000_000);
     let mut out = Vec::with_capacity(n);
+    let step = angle / n as f64;
+    // cos t = 1 - t^2/2; sin t = t (1 - t^2/6), as the firmware computes them.
+    let (cos, sin) = (1.0 - 0.5 * step * step, step * (6.0 - step * step) / 6.0);
+    let (mut r, mut by_series) = (ra, 0);
     for k in 1..n {
-        let t = k as f64 / n as f64;
-        let (s, c) = libm::sincos(angle * t);
-        let p = center + DVec2::new(ra.x * c - ra.y * s, ra.x * s + ra.y * c);
-        out.push(plane.join(p, wa + (wb - wa) * t));
+        if by_series < CHORDS_BY_SERIES {
+            r = DVec2::new(r.x * cos - r.y * sin, r.x * sin + r.y * cos);
+            by_series += 1;
+        } else {
+            let (s, c) = libm::sincos(angle * k as f64 / n as f64);
+            r = DVec2::new(ra.x * c - ra.y * s, ra.x * s + ra.y * c);
+            by_series = 0;
+        }
+        out.push(plane.join(center + r, wa + (wb - wa) * k as f64 / n as f64));
     }
     out.push(to);
     out

@@ -695,6 +695,12 @@ pub(super) static MACHINE: Section = Section {
             "travel of X, Y, Z ($130-$132)",
         ),
         key(
+            "steps_per_mm",
+            Kind::Vector { min: 1.0, max: 100_000.0, unit: "steps/mm" },
+            Rule("[250, 250, 250]"),
+            "steps of each motor for a millimetre ($100-$102)",
+        ),
+        key(
             "max_rate_mm_per_min",
             Kind::Vector { min: 1.0, max: 200_000.0, unit: "mm/min" },
             Required,

@@ -9,6 +9,10 @@ use super::error::{JobError, Source};
 use super::keys::{CUTTER, MACHINE, WOOD};
 use super::reader::Table;
 use super::types::{CutterSpec, Machine, Wood};
+use crate::geom::DVec3;
+
+/// Steps for a millimetre of machines that do not say: the firmware's default.
+const STEPS_PER_MM: f64 = 250.0;
 
 /// The machines, cutters and woods that jobs can name.
 #[derive(Debug, Clone, PartialEq)]
@@ -120,6 +124,11 @@ pub(super) fn read_machine(table: &Table<'_>, name: &str) -> Result<Machine, Job
         title: table.text("title").unwrap_or(&name).to_owned(),
         name,
         travel_mm: table.vector("travel_mm"),
+        steps_per_mm: if table.raw("steps_per_mm").is_some() {
+            table.vector("steps_per_mm")
+        } else {
+            DVec3::splat(STEPS_PER_MM)
+        },
         max_rate_mm_per_min: table.vector("max_rate_mm_per_min"),
         acceleration_mm_per_s2: table.vector("acceleration_mm_per_s2"),
         junction_deviation_mm: table.sure_number("junction_deviation_mm"),

@@ -77,6 +77,8 @@ pub struct Machine {
     pub title: String,
     /// Travel of X, Y, Z ($130-$132), mm.
     pub travel_mm: DVec3,
+    /// Steps of each motor for a millimetre ($100-$102).
+    pub steps_per_mm: DVec3,
     /// Highest speed of each axis ($110-$112), mm/min.
     pub max_rate_mm_per_min: DVec3,
     /// Acceleration of each axis ($120-$122), mm/s^2.

@@ -208,6 +208,7 @@ fn machine_lines(machine: &Machine) -> Vec<Line> {
         ("name", quoted(&machine.name)),
         ("title", quoted(&machine.title)),
         ("travel_mm", vector(machine.travel_mm)),
+        ("steps_per_mm", vector(machine.steps_per_mm)),
         ("max_rate_mm_per_min", vector(machine.max_rate_mm_per_min)),
         ("acceleration_mm_per_s2", vector(machine.acceleration_mm_per_s2)),
         ("junction_deviation_mm", number(machine.junction_deviation_mm)),

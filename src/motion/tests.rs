@@ -1,4 +1,5 @@
 use super::*;
+use crate::geom::DVec3;
 use proptest::prelude::*;
 
 fn machine() -> Machine {
@@ -6,6 +7,7 @@ fn machine() -> Machine {
         name: "test".into(),
         title: "Test".into(),
         travel_mm: DVec3::new(400.0, 600.0, 100.0),
+        steps_per_mm: DVec3::splat(250.0),
         max_rate_mm_per_min: DVec3::new(5000.0, 5000.0, 2000.0),
         acceleration_mm_per_s2: DVec3::new(300.0, 300.0, 200.0),
         junction_deviation_mm: 0.01,
@@ -93,14 +95,96 @@ fn a_dwell_drains_and_is_counted_apart() {
     assert_eq!(p.finish(), t.total_s());
 }
 
+/// Seconds of a program from rest at zero, as `relievo time` and the proof count them.
+fn program_seconds(text: &str, baud: Option<f64>) -> f64 {
+    let m = machine();
+    let program = crate::gcode::read::read(text, &m, DVec3::ZERO).unwrap();
+    let mut planner = match baud {
+        Some(baud) => Planner::with_baud(&m, baud),
+        None => Planner::new(&m),
+    };
+    let bytes: Vec<usize> = text.lines().map(|line| line.len() + 1).collect();
+    crate::proof::run_time(&program, &bytes, &mut planner);
+    planner.finish()
+}
+
+const RASTER: &str = include_str!("../../tests/data/planner/a_dense_raster.nc");
+const ARCS: &str = include_str!("../../tests/data/planner/c_arcs.nc");
+
+/// Times of the firmware itself (GRBL 1.1h run on a virtual clock).
+#[test]
+fn programs_take_the_time_of_the_firmware() {
+    for (text, firmware_s) in [(RASTER, 31.226), (ARCS, 115.379)] {
+        let seconds = program_seconds(text, None);
+        println!("{seconds:.3} s, firmware {firmware_s} s");
+        assert!((seconds / firmware_s - 1.0).abs() < 0.01, "{seconds} s, firmware {firmware_s} s");
+    }
+}
+
+#[test]
+fn a_fast_line_costs_nothing_and_a_slow_one_sets_the_pace() {
+    // Five lines of 21 bytes at most wait in the controller, the rest comes at the line's speed.
+    let mut text = String::new();
+    for k in 1..=2000 {
+        text += &format!("G1 X{:.3} Y0 F5000\n", f64::from(k) * 0.1);
+    }
+    let at_leisure = program_seconds(&text, None);
+    assert!(program_seconds(&text, Some(1e9)) - at_leisure < 1e-3);
+    let wire_s = text.len() as f64 * 10.0 / 9600.0;
+    let slow_s = program_seconds(&text, Some(9600.0));
+    assert!(slow_s >= wire_s && slow_s < wire_s * 1.02, "{slow_s} {wire_s}");
+}
+
+#[test]
+fn moves_shorter_than_half_a_step_are_none() {
+    let m = feed(DVec3::ZERO, DVec3::X * 0.0019, 600.0);
+    assert_eq!(seconds(&[m], &machine()), 0.0);
+}
+
+/// Runs points at a feed through the stepper: seconds and the last position.
+fn stepped(points: &[DVec3], feed_mm_per_min: f64) -> (f64, [i64; 3]) {
+    let mut ring = Ring::new(Limits::from(&machine()));
+    let mut stepper = Stepper::new(ring.limits().steps(points[0]));
+    let (mut waiting, mut seconds) = (points.windows(2).peekable(), 0.0);
+    loop {
+        while !ring.is_full() {
+            let Some(w) = waiting.next() else { break };
+            let (a, b) = (ring.limits().steps(w[0]), ring.limits().steps(w[1]));
+            if ring.push(std::array::from_fn(|k| b[k] - a[k]), Pace::Feed(feed_mm_per_min / 60.0)) {
+                stepper.replan();
+            }
+        }
+        stepper.prepare(&mut ring);
+        let Some(next_s) = stepper.next_s() else { return (seconds, stepper.position()) };
+        seconds += next_s;
+        stepper.advance(next_s);
+    }
+}
+
 proptest! {
+    #[test]
+    fn the_stepper_takes_the_time_of_the_planner_and_arrives(
+        points in prop::collection::vec((-20.0f64..20.0, -20.0f64..20.0, -3.0f64..3.0), 2..60),
+    ) {
+        let m = machine();
+        let points: Vec<DVec3> = points.iter().map(|q| DVec3::new(q.0, q.1, q.2)).collect();
+        let moves: Vec<Move> = points.windows(2).map(|w| feed(w[0], w[1], 1500.0)).collect();
+        let (seconds_stepped, at) = stepped(&points, 1500.0);
+        let planned = seconds(&moves, &m);
+        // Slow starts wait for a whole step and the time of a part of one is left at each block's end.
+        let slack = 0.002 * planned + 0.002 * points.len() as f64;
+        prop_assert!((seconds_stepped - planned).abs() < slack, "{seconds_stepped} {planned}");
+        prop_assert_eq!(at, Limits::from(&m).steps(points[points.len() - 1]));
+    }
+
     #[test]
     fn no_program_is_faster_than_its_feed_or_slower_than_stopping_at_every_corner(
         points in prop::collection::vec((-20.0f64..20.0, -20.0f64..20.0, -3.0f64..3.0), 2..60),
     ) {
         let m = machine();
         let moves: Vec<Move> = points.windows(2).map(|w| {
-            let p = |q: (f64, f64, f64)| DVec3::new(q.0, q.1, q.2);
+            // Whole steps: what lies between two is not the planner's.
+            let p = |q: (f64, f64, f64)| (DVec3::new(q.0, q.1, q.2) * 250.0).round() / 250.0;
             feed(p(w[0]), p(w[1]), 1500.0)
         }).collect();
         let t = seconds(&moves, &m);

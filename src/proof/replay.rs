@@ -1,7 +1,7 @@
 //! Reads the programs, carves a fresh blank with them and checks every move against machine, cutter and wood.
 
 use super::failure::{FailureKind, Finding, Ledger};
-use super::{ProgramReport, ProgramText, ProofError};
+use super::{ProgramReport, ProgramText, ProofError, time};
 use crate::cutter::Profile;
 use crate::gcode::read::{self, EventKind, Program};
 use crate::geom::{Bounds, DVec2, DVec3, Grid, Heightfield, Move, MoveKind};
@@ -468,21 +468,7 @@ impl Case<'_> {
     /// Time by the model of the planner.
     fn times(&self) -> crate::motion::Times {
         let mut planner = Planner::new(&self.job.machine);
-        let mut events = self.program.events.iter().peekable();
-        for k in 0..=self.program.moves.len() {
-            while let Some(e) = events.next_if(|e| e.at_move <= k) {
-                match e.kind {
-                    EventKind::Dwell { seconds } => planner.dwell(seconds),
-                    EventKind::SpindleOn { .. } | EventKind::SpindleOff | EventKind::End => {
-                        planner.sync();
-                    }
-                }
-            }
-            if let Some(m) = self.program.moves.get(k) {
-                planner.push(m);
-            }
-        }
-        planner.sync();
+        time::run(self.program, &[], &mut planner);
         planner.times()
     }
 }

@@ -17,6 +17,7 @@ fn machine() -> Machine {
         name: "test".into(),
         title: "Test".into(),
         travel_mm: DVec3::new(400.0, 600.0, 100.0),
+        steps_per_mm: DVec3::splat(250.0),
         max_rate_mm_per_min: DVec3::new(5000.0, 5000.0, 2000.0),
         acceleration_mm_per_s2: DVec3::new(300.0, 300.0, 200.0),
         junction_deviation_mm: 0.01,

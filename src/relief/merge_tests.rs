@@ -20,6 +20,7 @@ fn job(layers: Vec<LayerSpec>) -> Job {
             name: "m".into(),
             title: "M".into(),
             travel_mm: DVec3::splat(400.0),
+            steps_per_mm: DVec3::splat(250.0),
             max_rate_mm_per_min: DVec3::splat(5000.0),
             acceleration_mm_per_s2: DVec3::splat(400.0),
             junction_deviation_mm: 0.01,

@@ -44,6 +44,7 @@ pub(crate) fn job(
             name: "router".into(),
             title: "Router".into(),
             travel_mm: DVec3::new(425.0, 465.0, 80.0),
+            steps_per_mm: DVec3::splat(250.0),
             max_rate_mm_per_min: DVec3::new(5000.0, 5000.0, 2500.0),
             acceleration_mm_per_s2: DVec3::splat(400.0),
             junction_deviation_mm: 0.01,

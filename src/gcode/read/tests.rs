@@ -6,6 +6,7 @@ fn machine() -> Machine {
         name: "test".into(),
         title: "Test".into(),
         travel_mm: DVec3::new(400.0, 600.0, 100.0),
+        steps_per_mm: DVec3::splat(250.0),
         max_rate_mm_per_min: DVec3::new(5000.0, 5000.0, 2000.0),
         acceleration_mm_per_s2: DVec3::new(300.0, 300.0, 200.0),
         junction_deviation_mm: 0.01,
@@ -68,7 +69,9 @@ fn inches_and_increments_are_converted() {
 
 #[test]
 fn arcs_run_the_right_way_in_every_plane() {
-    // Quarter arcs of radius 10; the middle of each lies on the circle on the side of the turn.
+    // Quarter arcs of radius 10; the middle of each lies on the circle on the side of the turn. The firmware's
+    // series for a turn by t shrinks the radius by t^4/24 a chord, for 12 chords at most; chords are 0.4 mm.
+    let off = 10.0 * 12.0 * 0.041_f64.powi(4) / 24.0;
     for (text, middle) in [
         ("G17 G3 X-10 Y10 I-10 J0", [-10.0, 0.0]),
         ("G17 G2 X10 Y10 I10 J0", [10.0, 0.0]),
@@ -81,7 +84,7 @@ fn arcs_run_the_right_way_in_every_plane() {
         assert!(arc.len() > 20, "{text}");
         for m in &arc {
             let r = m.to.truncate().distance(DVec2::from_array(middle));
-            assert!((r - 10.0).abs() < 1e-9, "{text}: {r}");
+            assert!((r - 10.0).abs() < off, "{text}: {r}");
         }
     }
     let p = ok("G0 Z0\nF1000\nG18 G2 X20 Z0 I10 K0\n");
