@@ -183,6 +183,41 @@ impl Turned {
         self.radius_mm
     }
 
+    /// [`Turned::touch`] for many slopes at once, and the height there above the tip, mm: the slope never falls from piece
+    /// to piece, so each adds what a contact has passed of it.
+    #[inline(always)]
+    pub(crate) fn touch_all(&self, slopes: &[f64], r_mm: &mut [f64], height_mm: &mut [f64]) {
+        r_mm.fill(0.0);
+        height_mm.fill(0.0);
+        for piece in &self.pieces {
+            let (from, to) = (piece.from, piece.to);
+            match piece.form {
+                Form::Line { slope: rise, .. } => {
+                    for (&slope, (r_mm, height_mm)) in
+                        slopes.iter().zip(r_mm.iter_mut().zip(height_mm.iter_mut()))
+                    {
+                        let passed = if slope > rise { to - from } else { 0.0 };
+                        *r_mm += passed;
+                        *height_mm += rise * passed;
+                    }
+                }
+                Form::Arc { r, radius, .. } => {
+                    let (near, far) = (from - r, to - r);
+                    let deepest = (radius * radius - near * near).max(0.0).sqrt();
+                    for (&slope, (r_mm, height_mm)) in
+                        slopes.iter().zip(r_mm.iter_mut().zip(height_mm.iter_mut()))
+                    {
+                        let off = radius * slope / (1.0 + slope * slope).sqrt();
+                        let off = if off > near { off } else { near };
+                        let off = if off < far { off } else { far };
+                        *r_mm += off - near;
+                        *height_mm += deepest - (radius * radius - off * off).max(0.0).sqrt();
+                    }
+                }
+            }
+        }
+    }
+
     /// On a straight line that passes the axis at the distance `aside` >= 0: how far from the foot of the axis a line of
     /// this slope (rise over run, not negative) touches the end, mm; the end of the chord where it does not.
     ///

@@ -32,17 +32,17 @@ const SEAM: f64 = 1e-9;
 
 /// What the kernels need to know of the cutter and the grid.
 #[derive(Debug, Clone, Copy)]
-struct Cutter {
+struct Cutter<'a> {
     radius_mm: f64,
     pitch_mm: f64,
-    is_ball: bool,
+    profile: &'a Profile,
 }
 
 /// The two facets of every cell of one row: how far the axis stands from the contact, in pitches, and
 /// what they raise.
 #[derive(Debug)]
 pub(super) struct FacetRow<'a> {
-    cutter: Cutter,
+    cutter: Cutter<'a>,
     /// Heights along the lower and the upper border of the cells.
     z: [&'a [f32]; 2],
     /// Row of the cells minus the first row of the band.
@@ -66,6 +66,10 @@ struct Steps {
     node: Vec<u32>,
     /// Tip height there; -inf when the facet touches at no node.
     tip: Vec<f32>,
+    /// Of convex forms: how steep the facet is, how far from the axis it touches and how high above the tip, mm.
+    steepness: Vec<f64>,
+    away_mm: Vec<f64>,
+    above_mm: Vec<f64>,
 }
 
 impl Steps {
@@ -76,6 +80,9 @@ impl Steps {
             diagonal: vec![0.0; cells],
             node: vec![0; cells],
             tip: vec![0.0; cells],
+            steepness: vec![0.0; cells],
+            away_mm: vec![0.0; cells],
+            above_mm: vec![0.0; cells],
         }
     }
 }
@@ -115,18 +122,62 @@ fn tilt(
     side: f64,
     facet: impl Fn(usize) -> (f64, f64, f64),
 ) {
-    let Cutter { radius_mm, pitch_mm, is_ball } = *cutter;
-    let (one, high, low) = if is_ball { (1.0, radius_mm, radius_mm) } else { (0.0, 0.0, 0.0) };
-    let (per_mm, reach) = (1.0 / pitch_mm, radius_mm / pitch_mm);
+    let place = Place { row, rows, side };
+    let per_mm = 1.0 / cutter.pitch_mm;
+    let radius_mm = cutter.radius_mm;
+    let reach = radius_mm * per_mm;
+    match cutter.profile {
+        Profile::Ball { .. } => settle(steps, cells, &place, &facet, |_, gx, gy| {
+            let flatten = 1.0 / (1.0 + (gx * gx + gy * gy) * per_mm * per_mm).sqrt();
+            (flatten * reach * per_mm, radius_mm - radius_mm * flatten)
+        }),
+        Profile::Flat { .. } => settle(steps, cells, &place, &facet, |_, gx, gy| {
+            (reach / (gx * gx + gy * gy).sqrt(), 0.0)
+        }),
+        Profile::Turned(form) => {
+            let mut steepness = std::mem::take(&mut steps.steepness);
+            let mut away_mm = std::mem::take(&mut steps.away_mm);
+            let mut above_mm = std::mem::take(&mut steps.above_mm);
+            for (i, steepness) in steepness.iter_mut().enumerate() {
+                let (_, gx, gy) = facet(i);
+                *steepness = (gx * gx + gy * gy).sqrt() * per_mm;
+            }
+            form.touch_all(&steepness, &mut away_mm, &mut above_mm);
+            let (steep, away, above) = (&steepness[..cells], &away_mm[..cells], &above_mm[..cells]);
+            settle(steps, cells, &place, &facet, |i, _, _| {
+                let steepness = if steep[i] > 0.0 { steep[i] } else { 1.0 };
+                (away[i] / steepness * per_mm * per_mm, above[i])
+            });
+            (steps.steepness, steps.away_mm, steps.above_mm) = (steepness, away_mm, above_mm);
+        }
+    }
+}
+
+/// Which facets of which row are looked at.
+struct Place {
+    row: f64,
+    rows: f64,
+    side: f64,
+}
+
+/// Fills the steps, given for every facet and its rise per cell how many pitches the axis stands downhill for a rise of one
+/// mm a cell, and how high above the tip the contact lies, mm.
+#[inline(always)]
+fn settle(
+    steps: &mut Steps,
+    cells: usize,
+    &Place { row, rows, side }: &Place,
+    facet: &impl Fn(usize) -> (f64, f64, f64),
+    contact: impl Fn(usize, f64, f64) -> (f64, f64),
+) {
     let columns = (cells + 1) as f64;
     let (x, y) = (&mut steps.x[..cells], &mut steps.y[..cells]);
     let (diagonal, node) = (&mut steps.diagonal[..cells], &mut steps.node[..cells]);
     let tip = &mut steps.tip[..cells];
     for i in 0..cells {
         let (z, rise_x, rise_y) = facet(i);
-        let (gx, gy) = (rise_x * per_mm, rise_y * per_mm);
-        let flatten = 1.0 / (one + (gx * gx + gy * gy)).sqrt();
-        let (sx, sy) = (-gx * flatten * reach, -gy * flatten * reach);
+        let (per_rise, above_mm) = contact(i, rise_x, rise_y);
+        let (sx, sy) = (-rise_x * per_rise, -rise_y * per_rise);
         x[i] = sx;
         y[i] = sy;
         diagonal[i] = sy - sx;
@@ -137,7 +188,7 @@ fn tilt(
             (u - v) * side >= -SEAM && col >= 0.0 && col < columns && line >= 0.0 && line < rows;
         // A facet that touches nowhere "raises" a node of the first row by -inf: no branch.
         node[i] = if touches { line * columns + col } else { i as f64 } as u32;
-        let height = z + rise_x * u + rise_y * v + (high * flatten - low);
+        let height = z + rise_x * u + rise_y * v - above_mm;
         tip[i] = if touches { height as f32 } else { f32::NEG_INFINITY };
     }
 }
@@ -152,7 +203,7 @@ enum Run {
 
 /// The rows that one task writes.
 struct Band<'a> {
-    cutter: Cutter,
+    cutter: Cutter<'a>,
     z: &'a [f32],
     nx: usize,
     first_row: usize,
@@ -170,11 +221,7 @@ pub(super) fn raise_to_facets_and_edges(
 ) {
     let grid = surface.grid();
     let (nx, ny) = (grid.nx, grid.ny);
-    let cutter = Cutter {
-        radius_mm: profile.radius_mm(),
-        pitch_mm: grid.pitch_mm,
-        is_ball: matches!(profile, Profile::Ball { .. }),
-    };
+    let cutter = Cutter { radius_mm: profile.radius_mm(), pitch_mm: grid.pitch_mm, profile };
     let chords = |spacing_mm: f64, limit: usize| -> Vec<f64> {
         let lines = ((cutter.radius_mm + TOUCH_MM) / spacing_mm).min(limit as f64) as usize;
         let half = |q: f64| (cutter.radius_mm.powi(2) - q * q).max(0.0).sqrt();
@@ -265,13 +312,14 @@ impl Band<'_> {
 
     /// One edge, at the nodes on the lines `from..=to` beside it.
     fn edge(&mut self, run: Run, i: usize, j: usize, from: f64, to: f64) {
-        let Cutter { radius_mm, pitch_mm, is_ball } = self.cutter;
-        let (end, length, lines) = match run {
-            Run::Right => (j * self.nx + i + 1, pitch_mm, self.half_chords[0]),
-            Run::Up => ((j + 1) * self.nx + i, pitch_mm, self.half_chords[0]),
+        let Cutter { radius_mm, pitch_mm, profile } = self.cutter;
+        let (end, length, spacing_mm, lines) = match run {
+            Run::Right => (j * self.nx + i + 1, pitch_mm, pitch_mm, self.half_chords[0]),
+            Run::Up => ((j + 1) * self.nx + i, pitch_mm, pitch_mm, self.half_chords[0]),
             Run::Diagonal => (
                 (j + 1) * self.nx + i + 1,
                 pitch_mm * std::f64::consts::SQRT_2,
+                pitch_mm * std::f64::consts::FRAC_1_SQRT_2,
                 self.half_chords[1],
             ),
         };
@@ -287,11 +335,18 @@ impl Band<'_> {
             let line = k;
             k += 1;
             let Some(&w) = lines.get(line.unsigned_abs() as usize) else { continue };
-            // From the foot of the axis on the edge to the contact, in lengths of the edge.
-            let step = if is_ball { slope * flatten * w } else { side * w } / length;
-            if !is_ball && rise.abs() <= LEVEL_MM && w >= length {
-                continue;
-            }
+            // From the foot of the axis on the edge to the contact, mm, and how high above the tip that lies.
+            let (step, above_mm) = match profile {
+                Profile::Ball { .. } => (slope * flatten * w, radius_mm - w * flatten),
+                Profile::Flat { .. } if rise.abs() <= LEVEL_MM && w >= length => continue,
+                Profile::Flat { .. } => (side * w, 0.0),
+                Profile::Turned(form) => {
+                    let aside = (line.unsigned_abs() as f64 * spacing_mm).min(radius_mm);
+                    let step = form.touch_along(aside, slope.abs());
+                    (side * step, form.height((aside * aside + step * step).sqrt()))
+                }
+            };
+            let step = step / length;
             let foot = if run == Run::Diagonal { line as f64 * 0.5 } else { 0.0 };
             let along = ceil(foot - step);
             let contact = along - foot + step;
@@ -308,8 +363,7 @@ impl Band<'_> {
             if x < 0 || x >= self.nx as i64 || y < 0 || y >= rows {
                 continue;
             }
-            let lift = if is_ball { w * flatten - radius_mm } else { 0.0 };
-            let tip = (z + rise * contact + lift) as f32;
+            let tip = (z + rise * contact - above_mm) as f32;
             let out = &mut self.out[y as usize * self.nx + x as usize];
             *out = if tip > *out { tip } else { *out };
         }

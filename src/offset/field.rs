@@ -2,7 +2,6 @@
 
 use rayon::prelude::*;
 
-use super::Dropper;
 use super::exact;
 use super::fold::{Quarter, fold};
 use super::simd::Path;
@@ -13,8 +12,7 @@ use crate::geom::Heightfield;
 /// triangulated surface, mm. Heights must be numbers.
 ///
 /// The nodes of the surface are dilated by the cutter; then the contacts on facets and edges are added,
-/// in closed form and in `f64` (for cutters other than flats and balls by exact drops, which are slower). What remains is the rounding of `f32`: below 0.1 um for heights
-/// within 1 m.
+/// in closed form and in `f64`. What remains is the rounding of `f32`: below 0.1 um for heights within 1 m.
 pub fn tip_field(surface: &Heightfield, profile: &Profile) -> Heightfield {
     tip_field_on(Path::best(), surface, profile)
 }
@@ -22,13 +20,7 @@ pub fn tip_field(surface: &Heightfield, profile: &Profile) -> Heightfield {
 /// [`tip_field`] with given vector instructions.
 pub(super) fn tip_field_on(path: Path, surface: &Heightfield, profile: &Profile) -> Heightfield {
     let mut tip = nodes_only(path, surface, profile);
-    if let Profile::Turned(_) = profile {
-        let dropper = Dropper::new(surface, profile.clone());
-        let rows = tip.par_chunks_mut(surface.grid().nx).enumerate();
-        rows.for_each(|(j, row)| dropper.raise_row(j, row));
-    } else {
-        exact::raise_to_facets_and_edges(path, surface, profile, &mut tip);
-    }
+    exact::raise_to_facets_and_edges(path, surface, profile, &mut tip);
     Heightfield::from_z(*surface.grid(), tip)
 }
 
