@@ -164,6 +164,17 @@ impl Turned {
         self.pieces.last().map_or(0.0, |rim| rim.height(rim.to))
     }
 
+    /// Height above the tip and slope (rise over run) at `r_mm` from the axis, mm; beyond the rim those of the rim. On an
+    /// edge the flatter of its two slopes, and 0 on the axis.
+    #[inline]
+    pub(crate) fn height_and_slope(&self, r_mm: f64) -> (f64, f64) {
+        let piece = self.pieces.iter().find(|piece| r_mm <= piece.to).or(self.pieces.last());
+        piece.map_or((0.0, 0.0), |piece| {
+            let r_mm = r_mm.min(piece.to);
+            (piece.height(r_mm), if r_mm > 0.0 { piece.slope(r_mm) } else { 0.0 })
+        })
+    }
+
     /// Distance from the axis at which a plane of this slope (rise over run, not negative) touches the end, mm.
     pub fn touch(&self, slope: f64) -> f64 {
         if slope <= 0.0 {
@@ -224,6 +235,16 @@ impl Turned {
     /// The profile along the line is convex: the contact is in the first piece at whose outer end the profile is as
     /// steep as the line.
     pub fn touch_along(&self, aside: f64, slope: f64) -> f64 {
+        self.touch_along_between(aside, slope, [0.0, f64::INFINITY])
+    }
+
+    /// [`Turned::touch_along`] where it is known to lie between two distances from the foot, mm.
+    pub(crate) fn touch_along_between(
+        &self,
+        aside: f64,
+        slope: f64,
+        [least, most]: [f64; 2],
+    ) -> f64 {
         if slope <= 0.0 {
             return 0.0;
         }
@@ -249,7 +270,9 @@ impl Turned {
                     (radius * radius - q2).max(0.0).sqrt() * sine(slope)
                 }
                 Form::Arc { r, radius, .. } => {
-                    let (lo, hi) = (piece.from.max(aside) - r, piece.to - r);
+                    let away = |along: f64| (q2 + along * along).sqrt();
+                    let lo = piece.from.max(away(least)) - r;
+                    let hi = piece.to.min(away(most)).max(lo + r) - r;
                     along(r + torus(r, radius, aside, slope, lo, hi))
                 }
             };
@@ -347,7 +370,10 @@ impl Turned {
 /// the bracket, halves it.
 fn torus(r: f64, radius: f64, aside: f64, slope: f64, mut lo: f64, mut hi: f64) -> f64 {
     let (q2, g2, p2) = (aside * aside, slope * slope, radius * radius);
-    let mut u = (radius * sine(slope)).clamp(lo, hi);
+    let mut u = radius * sine(slope);
+    if !(u > lo && u < hi) {
+        u = 0.5 * (lo + hi);
+    }
     for step in 0..MOST_STEPS {
         let at = r + u;
         let chord = at * at - q2;

@@ -400,11 +400,36 @@ impl Search<'_> {
             for i in x * FAN..(x * FAN + FAN).min(nx - 1) {
                 let cell = self.cell(i, j);
                 let top = cell.z.into_iter().fold(f64::NEG_INFINITY, f64::max);
-                if top > self.floor && self.tip_below(top, self.nearest((i, j), 1)) > self.floor {
+                if top > self.floor
+                    && self.tip_below(top, self.nearest((i, j), 1)) > self.floor
+                    && self.ceiling(&cell) > self.floor
+                {
                     self.raise(cell.touch(self.profile), (x, y));
                 }
             }
         }
+    }
+
+    /// A height that no tip over a contact in the cell exceeds: a convex form lies above its tangent plane over the
+    /// middle, and what a facet stands above that is highest at a corner.
+    #[inline]
+    fn ceiling(&self, cell: &Cell) -> f64 {
+        let Profile::Turned(form) = self.profile else { return f64::INFINITY };
+        let half = 0.5 * cell.pitch_mm;
+        let middle = cell.at + half;
+        let away = middle.length();
+        if away > self.radius_mm {
+            return f64::INFINITY;
+        }
+        let (rise, slope) = form.height_and_slope(away);
+        if !slope.is_finite() {
+            return f64::INFINITY;
+        }
+        let fall = middle * (slope * half / away.max(TOUCH_MM));
+        let (along, against) = (fall.x + fall.y, fall.x - fall.y);
+        let [z00, z10, z01, z11] = cell.z;
+        let above = (z00 + along).max(z11 - along).max((z10 - against).max(z01 + against));
+        above - rise + TOUCH_MM * (1.0 + slope)
     }
 
     /// Touches the facets and edges of a leaf, well inside a ball, that may beat the best contact.

@@ -21,7 +21,7 @@ use rayon::prelude::*;
 
 use super::contact::TOUCH_MM;
 use super::simd::{self, Path};
-use crate::cutter::Profile;
+use crate::cutter::{Profile, Turned};
 use crate::geom::Heightfield;
 
 /// A flat cutter's contact on an edge that rises less than this is left to its vertices, mm.
@@ -29,6 +29,9 @@ const LEVEL_MM: f64 = 5e-5;
 
 /// Slack of the test for the common leg of two facets, pitches.
 const SEAM: f64 = 1e-9;
+
+/// Parts of a right angle into which the slopes of edges are sorted.
+const SLOPES: usize = 128;
 
 /// What the kernels need to know of the cutter and the grid.
 #[derive(Debug, Clone, Copy)]
@@ -201,6 +204,52 @@ enum Run {
     Diagonal,
 }
 
+/// A convex form on one line parallel to an edge: for slopes with sines 0, 1 / `SLOPES`, ... 1 the contact on an endless
+/// edge, and how much higher the tip stands than the edge beside the axis.
+#[derive(Debug)]
+struct Touches {
+    /// Rise over run.
+    slope: Vec<f64>,
+    /// Distance of the contact from the foot of the axis, mm; it never falls as the slope rises.
+    away_mm: Vec<f64>,
+    /// slope * away - height of the profile there, mm; convex in the slope, and rising by `away_mm`.
+    lift_mm: Vec<f64>,
+}
+
+impl Touches {
+    fn new(form: &Turned, aside_mm: f64) -> Self {
+        let slope = |k: usize| {
+            let sine = k as f64 / SLOPES as f64;
+            sine / (1.0 - sine * sine).sqrt()
+        };
+        let slope: Vec<f64> = (0..=SLOPES).map(slope).collect();
+        // Just above slope 0 a flat bottom is left at once: that leap belongs to no two neighbours.
+        let touch = |&slope: &f64| form.touch_along(aside_mm, slope.max(1e-12));
+        let away_mm: Vec<f64> = slope.iter().map(touch).collect();
+        let lift = |(&slope, &away): (&f64, &f64)| {
+            slope * away - form.height((aside_mm * aside_mm + away * away).sqrt())
+        };
+        let lift_mm = slope.iter().zip(&away_mm).map(lift).collect();
+        Self { slope, away_mm, lift_mm }
+    }
+
+    /// Two distances between which an edge of this slope is touched, mm, and a lift that it does not exceed, mm; with
+    /// equal distances the lift is the very one.
+    #[inline]
+    fn around(&self, slope: f64, sine: f64) -> ([f64; 2], f64) {
+        if slope <= 0.0 {
+            return ([0.0; 2], self.lift_mm[0]);
+        }
+        let near = ((sine * SLOPES as f64) as usize).min(SLOPES - 1);
+        // Round-off may have put it one place too far.
+        let k = if self.slope[near] > slope { near - 1 } else { near };
+        let away = [self.away_mm[k], self.away_mm[k + 1]];
+        let over = slope - self.slope[k];
+        let lift_mm = self.lift_mm[k] + over * away[1];
+        (away, lift_mm)
+    }
+}
+
 /// The rows that one task writes.
 struct Band<'a> {
     cutter: Cutter<'a>,
@@ -210,6 +259,8 @@ struct Band<'a> {
     out: &'a mut [f32],
     /// Half chord of the cutter on the lines k = 0, 1, ... parallel to a leg and to the diagonal, mm.
     half_chords: [&'a [f64]; 2],
+    /// For convex forms, on the same lines.
+    touches: [&'a [Touches]; 2],
 }
 
 /// Raises `tip`, the dilation of the nodes, to the contacts with facets and edges.
@@ -229,12 +280,21 @@ pub(super) fn raise_to_facets_and_edges(
     };
     let straight = chords(grid.pitch_mm, nx + ny);
     let slanted = chords(grid.pitch_mm * std::f64::consts::FRAC_1_SQRT_2, nx + ny);
+    let touches = |spacing_mm: f64, lines: usize| -> Vec<Touches> {
+        let Profile::Turned(form) = profile else { return Vec::new() };
+        let aside = |k: usize| (k as f64 * spacing_mm).min(cutter.radius_mm);
+        (0..lines).map(|k| Touches::new(form, aside(k))).collect()
+    };
+    let across = touches(grid.pitch_mm, straight.len());
+    let aslant = touches(grid.pitch_mm * std::f64::consts::FRAC_1_SQRT_2, slanted.len());
     // Bands as few as can be: what lies within reach of a border is worked out on both sides. The
     // result does not depend on them, because the highest contact wins in any order.
     let rows = ny.div_ceil(rayon::current_num_threads()).max(2 * straight.len());
     tip.par_chunks_mut(rows * nx).enumerate().for_each(|(band, out)| {
         let half_chords = [&straight[..], &slanted[..]];
-        let band = Band { cutter, z: surface.z(), nx, first_row: band * rows, out, half_chords };
+        let touches = [&across[..], &aslant[..]];
+        let first_row = band * rows;
+        let band = Band { cutter, z: surface.z(), nx, first_row, out, half_chords, touches };
         band.raise(path);
     });
 }
@@ -313,59 +373,78 @@ impl Band<'_> {
     /// One edge, at the nodes on the lines `from..=to` beside it.
     fn edge(&mut self, run: Run, i: usize, j: usize, from: f64, to: f64) {
         let Cutter { radius_mm, pitch_mm, profile } = self.cutter;
-        let (end, length, spacing_mm, lines) = match run {
-            Run::Right => (j * self.nx + i + 1, pitch_mm, pitch_mm, self.half_chords[0]),
-            Run::Up => ((j + 1) * self.nx + i, pitch_mm, pitch_mm, self.half_chords[0]),
-            Run::Diagonal => (
-                (j + 1) * self.nx + i + 1,
-                pitch_mm * std::f64::consts::SQRT_2,
-                pitch_mm * std::f64::consts::FRAC_1_SQRT_2,
-                self.half_chords[1],
-            ),
+        let slanted = usize::from(run == Run::Diagonal);
+        let lines = self.half_chords[slanted];
+        let (end, length) = match run {
+            Run::Right => (j * self.nx + i + 1, pitch_mm),
+            Run::Up => ((j + 1) * self.nx + i, pitch_mm),
+            Run::Diagonal => ((j + 1) * self.nx + i + 1, pitch_mm * std::f64::consts::SQRT_2),
         };
         let z = f64::from(self.z[j * self.nx + i]);
         let rise = f64::from(self.z[end]) - z;
         let slope = rise / length;
         let flatten = 1.0 / (1.0 + slope * slope).sqrt();
         let side = if slope < 0.0 { -1.0 } else { 1.0 };
-        let rows = (self.out.len() / self.nx) as i64;
-        let (column, row) = (i as i64, j as i64 - self.first_row as i64);
         let mut k = ceil(from) as i64;
         while k as f64 <= to {
             let line = k;
             k += 1;
             let Some(&w) = lines.get(line.unsigned_abs() as usize) else { continue };
+            let foot = if run == Run::Diagonal { line as f64 * 0.5 } else { 0.0 };
             // From the foot of the axis on the edge to the contact, mm, and how high above the tip that lies.
             let (step, above_mm) = match profile {
                 Profile::Ball { .. } => (slope * flatten * w, radius_mm - w * flatten),
                 Profile::Flat { .. } if rise.abs() <= LEVEL_MM && w >= length => continue,
                 Profile::Flat { .. } => (side * w, 0.0),
                 Profile::Turned(form) => {
-                    let aside = (line.unsigned_abs() as f64 * spacing_mm).min(radius_mm);
-                    let step = form.touch_along(aside, slope.abs());
-                    (side * step, form.height((aside * aside + step * step).sqrt()))
+                    let row = &self.touches[slanted][line.unsigned_abs() as usize];
+                    let (away, lift_mm) = row.around(slope.abs(), slope.abs() * flatten);
+                    // Where the contact may lie it may be too low to matter.
+                    let nodes = away.map(|away| ceil(foot - side * away / length));
+                    let matters = |along: f64| {
+                        let most = (z + rise * (along - foot) + lift_mm) as f32;
+                        self.node(run, (i, j), line, along).is_some_and(|n| most > self.out[n])
+                    };
+                    let few = (nodes[0] - nodes[1]).abs() <= 1.0;
+                    if few && !matters(nodes[0]) && !matters(nodes[1]) {
+                        continue;
+                    }
+                    if away[0] == away[1] {
+                        (side * away[0], slope.abs() * away[0] - lift_mm)
+                    } else {
+                        let spacing_mm = length * if slanted == 1 { 0.5 } else { 1.0 };
+                        let aside = (line.unsigned_abs() as f64 * spacing_mm).min(radius_mm);
+                        let step = form.touch_along_between(aside, slope.abs(), away);
+                        (side * step, form.height((aside * aside + step * step).sqrt()))
+                    }
                 }
             };
             let step = step / length;
-            let foot = if run == Run::Diagonal { line as f64 * 0.5 } else { 0.0 };
             let along = ceil(foot - step);
             let contact = along - foot + step;
             if contact > 1.0 {
                 continue;
             }
-            let along = along as i64;
-            let (di, dj) = match run {
-                Run::Right => (along, line),
-                Run::Up => (line, along),
-                Run::Diagonal => (along - line, along),
-            };
-            let (x, y) = (column + di, row + dj);
-            if x < 0 || x >= self.nx as i64 || y < 0 || y >= rows {
-                continue;
+            if let Some(node) = self.node(run, (i, j), line, along) {
+                let tip = (z + rise * contact - above_mm) as f32;
+                let out = &mut self.out[node];
+                *out = if tip > *out { tip } else { *out };
             }
-            let tip = (z + rise * contact - above_mm) as f32;
-            let out = &mut self.out[y as usize * self.nx + x as usize];
-            *out = if tip > *out { tip } else { *out };
         }
+    }
+
+    /// The node of the band on a line beside an edge that starts at (i, j), so many lengths along it.
+    #[inline]
+    fn node(&self, run: Run, (i, j): (usize, usize), line: i64, along: f64) -> Option<usize> {
+        let along = along as i64;
+        let (di, dj) = match run {
+            Run::Right => (along, line),
+            Run::Up => (line, along),
+            Run::Diagonal => (along - line, along),
+        };
+        let (x, y) = (i as i64 + di, j as i64 - self.first_row as i64 + dj);
+        let within =
+            x >= 0 && x < self.nx as i64 && y >= 0 && y < (self.out.len() / self.nx) as i64;
+        within.then(|| y as usize * self.nx + x as usize)
     }
 }

@@ -294,6 +294,30 @@ fn the_tip_field_is_the_exact_drop_at_every_node() {
     }
 }
 
+/// Of any size, on bigger fields than the plain drop cutter can take.
+#[test]
+fn the_tip_field_of_convex_forms_is_the_exact_drop_at_every_node() {
+    let forms = convex_forms();
+    let pitches = [0.1, 0.4, 1.7];
+    for (n, (name, surface)) in surfaces(36, 0.1).into_iter().enumerate() {
+        for (k, profile) in forms.iter().enumerate() {
+            let grid = grid(36, 27, pitches[(n + k) % pitches.len()]);
+            let surface = Heightfield::from_z(grid, surface.z().to_vec());
+            let tip = tip_field(&surface, profile);
+            let dropper = Dropper::new(&surface, profile.clone());
+            for j in (0..grid.ny).step_by(2) {
+                for i in 0..grid.nx {
+                    let (got, want) = (f64::from(tip.at(i, j)), dropper.drop(grid.node(i, j)));
+                    assert!(
+                        (got - want).abs() < 1e-6,
+                        "{name}, {profile:?} at ({i}, {j}): {got}, exact {want}"
+                    );
+                }
+            }
+        }
+    }
+}
+
 #[test]
 fn one_and_two_threads_and_every_instruction_set_give_the_same_bits() {
     let bits = |field: &[f32]| field.iter().map(|z| z.to_bits()).collect::<Vec<_>>();
