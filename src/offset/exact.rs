@@ -263,11 +263,12 @@ struct Band<'a> {
     touches: [&'a [Touches]; 2],
 }
 
-/// Raises `tip`, the dilation of the nodes, to the contacts with facets and edges.
+/// Raises `tip`, the dilation of the nodes of the rows `first_row`, ..., to the contacts with facets and edges.
 pub(super) fn raise_to_facets_and_edges(
     path: Path,
     surface: &Heightfield,
     profile: &Profile,
+    first_row: usize,
     tip: &mut [f32],
 ) {
     let grid = surface.grid();
@@ -289,11 +290,11 @@ pub(super) fn raise_to_facets_and_edges(
     let aslant = touches(grid.pitch_mm * std::f64::consts::FRAC_1_SQRT_2, slanted.len());
     // Bands as few as can be: what lies within reach of a border is worked out on both sides. The
     // result does not depend on them, because the highest contact wins in any order.
-    let rows = ny.div_ceil(rayon::current_num_threads()).max(2 * straight.len());
+    let rows = (tip.len() / nx).div_ceil(rayon::current_num_threads()).max(2 * straight.len());
     tip.par_chunks_mut(rows * nx).enumerate().for_each(|(band, out)| {
         let half_chords = [&straight[..], &slanted[..]];
         let touches = [&across[..], &aslant[..]];
-        let first_row = band * rows;
+        let first_row = first_row + band * rows;
         let band = Band { cutter, z: surface.z(), nx, first_row, out, half_chords, touches };
         band.raise(path);
     });

@@ -1,6 +1,6 @@
 //! The offset against a plain drop cutter that shares no code with it.
 
-use super::field::{nodes_only, tip_field_on};
+use super::field::{least_left, nodes_only, tip_field_on};
 use super::simd::Path;
 use super::*;
 use crate::cutter::Profile;
@@ -345,8 +345,12 @@ fn dilation_and_closing_are_their_definitions() {
         for profile in plain.into_iter().chain(convex) {
             let grid = surface.grid();
             let node = |n: usize| grid.node(n % grid.nx, n / grid.nx);
-            let fields: Vec<_> =
-                Path::available().map(|path| nodes_only(path, &surface, &profile)).collect();
+            let field = |path: Path| {
+                let mut tip = vec![0.0; grid.len()];
+                nodes_only(path, &surface, &profile, 0, &mut tip);
+                tip
+            };
+            let fields: Vec<_> = Path::available().map(field).collect();
             let left = closing(&surface, &profile);
             for n in 0..grid.len() {
                 let (mut high, mut low) = (f64::NEG_INFINITY, f64::INFINITY);
@@ -361,6 +365,26 @@ fn dilation_and_closing_are_their_definitions() {
                 }
                 assert!((f64::from(left.z()[n]) - low).abs() < 1e-6, "{name} {profile:?} {n}");
             }
+        }
+    }
+}
+
+#[test]
+fn what_cutters_leave_is_the_same_in_one_piece_and_in_stretches() {
+    let bits = |field: &Heightfield| field.z().iter().map(|z| z.to_bits()).collect::<Vec<_>>();
+    let cutters =
+        [Profile::Ball { radius_mm: 0.61 }, FLAT_3.slimmed(0.8), convex_forms().swap_remove(4)];
+    for (name, surface) in surfaces(70, 0.1) {
+        let mut want = closing(&tip_field(&surface, &cutters[0]), &cutters[0]);
+        for profile in &cutters[1..] {
+            let closed = closing(&tip_field(&surface, profile), profile);
+            for (want, closed) in want.z_mut().iter_mut().zip(closed.z()) {
+                *want = want.min(*closed);
+            }
+        }
+        for stretch_nodes in [1, 70 * 29, 70 * 1000] {
+            let got = least_left(&surface, &cutters, stretch_nodes);
+            assert!(bits(&got) == bits(&want), "{name}, {stretch_nodes}");
         }
     }
 }
