@@ -1,7 +1,7 @@
 //! Tip heights and what a cutter leaves, at every node of a field at once.
 
 use super::exact;
-use super::fold::{Dilation, Quarter, Side, fold};
+use super::fold::{Dilation, Quarter, Side, Way, dilate};
 use super::simd::Path;
 use crate::cutter::Profile;
 use crate::geom::{Grid, Heightfield};
@@ -46,7 +46,7 @@ pub(super) fn nodes_only(
     let grid = surface.grid();
     let quarter = &quarter(grid, profile);
     let of = Dilation { quarter, side: Side::Above, z: surface.z(), nx: grid.nx };
-    fold(path, &of, first_row, tip);
+    dilate(path, &of, Way::Cheaper, first_row, tip);
 }
 
 fn quarter(grid: &Grid, profile: &Profile) -> Quarter {
@@ -61,7 +61,7 @@ pub fn closing(tip: &Heightfield, profile: &Profile) -> Heightfield {
     let mut left = vec![f32::INFINITY; grid.len()];
     let quarter = &quarter(&grid, profile);
     let of = Dilation { quarter, side: Side::Below, z: tip.z(), nx: grid.nx };
-    fold(Path::best(), &of, 0, &mut left);
+    dilate(Path::best(), &of, Way::Cheaper, 0, &mut left);
     Heightfield::from_z(grid, left)
 }
 
@@ -87,7 +87,7 @@ pub(super) fn least_left(
             tip_rows(path, surface, profile, from, &mut tip);
             let mut left = vec![f32::INFINITY; least.len()];
             let of = Dilation { quarter, side: Side::Below, z: &tip, nx: grid.nx };
-            fold(path, &of, first - from, &mut left);
+            dilate(path, &of, Way::Cheaper, first - from, &mut left);
             for (least, left) in least.iter_mut().zip(left) {
                 *least = least.min(left);
             }

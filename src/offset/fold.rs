@@ -7,17 +7,27 @@
 
 use rayon::prelude::*;
 
+use super::scatter::Ball;
 use super::simd::{self, Path};
 use crate::cutter::Profile;
 
-/// Rows that one task writes.
+/// Rows that are folded at a time.
 const BAND_ROWS: usize = 128;
+
+/// Rows that one task writes if its nodes may be scattered: the fewer the bands, the fewer sources lie in two of them.
+const SCATTER_ROWS: usize = 4 * BAND_ROWS;
+
+/// Reach in nodes of the balls that may be scattered: smaller ones cost too little, larger ones are beyond the
+/// slack for single precision.
+const SCATTER_REACH: std::ops::RangeInclusive<usize> = 40..=4000;
 
 /// A quarter of an upside-down cutter at the nodes: minus its height at (dx, dy) nodes from the axis.
 #[derive(Debug)]
 pub(super) struct Quarter {
     /// For every dy the values for dx = 0, 1, ... as far as the cutter reaches.
-    rows: Vec<Vec<f32>>,
+    pub rows: Vec<Vec<f32>>,
+    /// The whole of a large ball.
+    ball: Option<Ball>,
 }
 
 impl Quarter {
@@ -31,11 +41,16 @@ impl Quarter {
             let within = r <= radius + super::contact::TOUCH_MM;
             within.then(|| profile.height_at(r.min(radius)).map(|z| -z as f32)).flatten()
         };
-        let rows = (0..=reach)
+        let rows: Vec<Vec<f32>> = (0..=reach)
             .map(|dy| (0..=reach).map_while(|dx| depth(dx, dy)).collect())
             .filter(|row: &Vec<f32>| !row.is_empty())
             .collect();
-        Self { rows }
+        let whole = SCATTER_REACH.contains(&reach) && reach < limit;
+        let ball = match *profile {
+            Profile::Ball { radius_mm } if whole => Some(Ball::new(&rows, radius_mm, pitch_mm)),
+            _ => None,
+        };
+        Self { rows, ball }
     }
 
     /// The farthest node along an axis.
@@ -56,7 +71,7 @@ pub(super) enum Side {
 impl Side {
     /// Turns heights over, so that the side is `Above`; done twice it gives them back.
     #[inline(always)]
-    fn turn(self, z: f32) -> f32 {
+    pub(super) fn turn(self, z: f32) -> f32 {
         match self {
             Self::Above => z,
             Self::Below => -z + 0.0,
@@ -77,16 +92,38 @@ pub(super) struct Dilation<'a> {
 /// The rows that one task writes, and what it reads.
 #[derive(Debug)]
 pub(super) struct Band<'a> {
-    of: Dilation<'a>,
-    first_row: usize,
-    out: &'a mut [f32],
+    pub of: Dilation<'a>,
+    pub first_row: usize,
+    pub out: &'a mut [f32],
+}
+
+/// How a large ball is dilated; the result is the same.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Way {
+    /// In every band the way that costs less.
+    Cheaper,
+    #[cfg(test)]
+    Fold,
+    #[cfg(test)]
+    Scatter,
 }
 
 /// Dilates the field at the nodes of the rows `first_row`, ...; no other copy of them is made.
-pub(super) fn fold(path: Path, of: &Dilation, first_row: usize, out: &mut [f32]) {
-    out.par_chunks_mut(BAND_ROWS * of.nx).enumerate().for_each(|(band, out)| {
-        let first_row = first_row + band * BAND_ROWS;
-        simd::fold_band(path, &mut Band { of: *of, first_row, out });
+pub(super) fn dilate(path: Path, of: &Dilation, way: Way, first_row: usize, out: &mut [f32]) {
+    let ball = of.quarter.ball.as_ref();
+    #[cfg(test)]
+    let ball = ball.filter(|_| way != Way::Fold);
+    let rows = if ball.is_some() { SCATTER_ROWS } else { BAND_ROWS };
+    out.par_chunks_mut(rows * of.nx).enumerate().for_each(|(band, out)| {
+        let first_row = first_row + band * rows;
+        let mut band = Band { of: *of, first_row, out };
+        if ball.is_some_and(|ball| simd::scatter_band(path, &mut band, ball, way)) {
+            return;
+        }
+        for (part, out) in band.out.chunks_mut(BAND_ROWS * of.nx).enumerate() {
+            let first_row = first_row + part * BAND_ROWS;
+            simd::fold_band(path, &mut Band { of: *of, first_row, out });
+        }
     });
 }
 

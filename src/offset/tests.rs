@@ -1,6 +1,7 @@
 //! The offset against a plain drop cutter that shares no code with it.
 
 use super::field::{least_left, nodes_only, tip_field_on};
+use super::fold::{Dilation, Quarter, Side, Way, dilate};
 use super::simd::Path;
 use super::*;
 use crate::cutter::Profile;
@@ -369,6 +370,43 @@ fn dilation_and_closing_are_their_definitions() {
     }
 }
 
+/// Scatters a ball of so many nodes on both sides of a field and compares it, bit by bit, with the fold.
+fn compare_scatter(name: &str, surface: &Heightfield, nodes: f64) {
+    let grid = surface.grid();
+    let ball = Profile::Ball { radius_mm: nodes * grid.pitch_mm };
+    let quarter = &Quarter::new(&ball, grid.pitch_mm, 10_000);
+    for side in [Side::Above, Side::Below] {
+        let of = Dilation { quarter, side, z: surface.z(), nx: grid.nx };
+        let first_row = if side == Side::Above { 0 } else { grid.ny / 3 };
+        let field = |path: Path, way: Way| {
+            let mut out = vec![0.25_f32; (grid.ny - first_row) * grid.nx];
+            dilate(path, &of, way, first_row, &mut out);
+            out
+        };
+        let want = field(Path::best(), Way::Fold);
+        for path in Path::available() {
+            for way in [Way::Scatter, Way::Cheaper] {
+                assert!(
+                    field(path, way) == want,
+                    "{name}, {nodes} nodes, {side:?} {path:?} {way:?}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn scattering_a_ball_gives_the_very_heights_of_the_fold() {
+    for (name, surface) in surfaces(90, 0.1) {
+        for nodes in [40.0, 47.37, 85.2] {
+            compare_scatter(name, &surface, nodes);
+        }
+    }
+    // More than one band.
+    let (name, surface) = surfaces(750, 0.02).swap_remove(3);
+    compare_scatter(name, &surface, 41.9);
+}
+
 #[test]
 fn what_cutters_leave_is_the_same_in_one_piece_and_in_stretches() {
     let bits = |field: &Heightfield| field.z().iter().map(|z| z.to_bits()).collect::<Vec<_>>();
@@ -460,6 +498,24 @@ proptest! {
         let p = b.min + b.size() * DVec2::new(x, y);
         let (got, want) = (Dropper::new(&surface, profile.clone()).drop(p), oracle(&surface, &profile, p));
         prop_assert!(got == want || (got - want).abs() < 1e-6, "{} {}", got, want);
+    }
+
+    #[test]
+    fn scattering_a_ball_gives_the_very_heights_of_the_fold_anywhere(
+        waves in proptest::collection::vec((0.0f64..0.4, 0.0f64..6.3, 0.0f64..6.3), 1..5),
+        height_mm in -1.0f64..4.0, far_mm in -300.0f64..300.0, nodes in 40.0f64..70.0,
+        pitch_mm in 0.02f64..0.5, wall in -1.0f64..1.0,
+    ) {
+        let surface = Heightfield::from_fn(grid(64, 57, pitch_mm), |p| {
+            let p = p / pitch_mm;
+            let wave = |&(often, turn, phase): &(f64, f64, f64)| {
+                let along = p.x * libm::cos(turn) + p.y * libm::sin(turn);
+                libm::sin(along * often + phase)
+            };
+            let step = if p.x * 0.6 + p.y * 0.8 > 30.0 { wall } else { 0.0 };
+            far_mm + step.max(0.0) + libm::exp2(height_mm) * 4.0 * pitch_mm * waves.iter().map(wave).sum::<f64>()
+        });
+        compare_scatter("waves", &surface, nodes);
     }
 
     #[test]
