@@ -404,7 +404,7 @@ impl Search<'_> {
                     && self.tip_below(top, self.nearest((i, j), 1)) > self.floor
                     && self.ceiling(&cell) > self.floor
                 {
-                    self.raise(cell.touch(self.profile), (x, y));
+                    self.raise(cell.touch(self.profile, self.floor), (x, y));
                 }
             }
         }
