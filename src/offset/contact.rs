@@ -114,8 +114,9 @@ fn bends_above(a: &End, b: &End, floor: f64) -> bool {
     let (tip_a, tip_b) = (a.z - a.profile.0, b.z - b.profile.0);
     let most = (tip_a + up * length).min(tip_b + down * length);
     let meet = (tip_a * down + tip_b * up + up * down * length) / (up + down);
-    // Near the rim the tangents may be too steep for the second bound.
-    most + TOUCH_MM > floor && !(meet + TOUCH_MM <= floor)
+    // Near the rim the tangents may be too steep for the second bound: no number rules nothing out.
+    let below = meet + TOUCH_MM <= floor;
+    most + TOUCH_MM > floor && !below
 }
 
 /// Tip height at which the cutter touches the edge from `a` to `b`, ends included.
