@@ -1,6 +1,7 @@
 //! What an offset costs: a table of milliseconds, ratios and drops a second.
 //!
-//! `cargo bench --bench offset` runs 1000 x 1000 and 4000 x 4000 nodes; `-- 300` runs one size only.
+//! `cargo bench --bench offset` runs 1000 x 1000 and 4000 x 4000 nodes; `-- 300` runs one size only;
+//! `-- panel` runs a 2440 x 1220 mm panel instead and tells the most memory held, where Linux tells it.
 //! Columns with 1T are time on the processor where Linux tells it, so that other work on the machine
 //! does not count; 2T is the shortest time on the clock.
 
@@ -16,7 +17,13 @@ use relievo::offset::{Dropper, closing, tip_field};
 
 const PITCH_MM: f64 = 0.1;
 
+/// Sides of the panel, mm.
+const PANEL_MM: [f64; 2] = [2440.0, 1220.0];
+
 fn main() {
+    if std::env::args().any(|a| a == "panel") {
+        return panel();
+    }
     let asked: Vec<usize> = std::env::args().skip(1).filter_map(|a| a.parse().ok()).collect();
     let sizes = if asked.is_empty() { vec![1000, 4000] } else { asked };
     let pools = [1, 2].map(|threads| {
@@ -38,6 +45,54 @@ fn main() {
             }
         }
     }
+}
+
+/// A panel that fills memory: the tip field of a 6 mm ball and its closing.
+fn panel() {
+    // A grid of more nodes than `Grid::covering` lets a job have.
+    let [nx, ny] = PANEL_MM.map(|mm| (mm / PITCH_MM).round() as usize + 1);
+    let grid = Grid { nx, ny, pitch_mm: PITCH_MM, origin: DVec2::ZERO };
+    let field = tiled(&relief(1000), grid);
+    let profile = Profile::Ball { radius_mm: 3.0 };
+    let field_mib = grid.len() as f64 * 4.0 / 1_048_576.0;
+    println!("\nrelief, {nx} x {ny} nodes at {PITCH_MM} mm, {field_mib:.0} MiB; ball 6");
+    println!("| work | s | nodes/s | most memory so far, MiB |");
+    println!("|---|---|---|---|");
+    let tell = |name: &str, start: Instant| {
+        let s = start.elapsed().as_secs_f64();
+        let peak = peak_mib().map_or("-".into(), |mib| format!("{mib:.0}"));
+        println!("| {name} | {s:.1} | {:.1} M | {peak} |", grid.len() as f64 / s / 1e6);
+    };
+    let start = Instant::now();
+    let tip = tip_field(&field, &profile);
+    tell("tip field", start);
+    drop(field);
+    let start = Instant::now();
+    black_box(closing(&tip, &profile));
+    tell("closing", start);
+}
+
+/// The field laid beside its mirror image, over and over, until the grid is full.
+fn tiled(field: &Heightfield, grid: Grid) -> Heightfield {
+    let fold = |k: usize, nodes: usize| {
+        let k = k % (2 * nodes - 2);
+        k.min(2 * nodes - 2 - k)
+    };
+    let of = field.grid();
+    let columns: Vec<usize> = (0..grid.nx).map(|i| fold(i, of.nx)).collect();
+    let mut z = Vec::with_capacity(grid.len());
+    for j in 0..grid.ny {
+        let row = field.row(fold(j, of.ny));
+        z.extend(columns.iter().map(|&i| row[i]));
+    }
+    Heightfield::from_z(grid, z)
+}
+
+/// The most memory that this process has held, MiB.
+fn peak_mib() -> Option<f64> {
+    let text = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = text.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
+    Some(line.trim().strip_suffix(" kB")?.parse::<f64>().ok()? / 1024.0)
 }
 
 /// Every form of cutter, and balls of three sizes.

@@ -16,6 +16,7 @@ mod exact;
 mod field;
 mod fold;
 mod reach;
+mod scatter;
 mod simd;
 
 pub use drop::Dropper;

@@ -164,6 +164,17 @@ impl Turned {
         self.pieces.last().map_or(0.0, |rim| rim.height(rim.to))
     }
 
+    /// Height above the tip and slope (rise over run) at `r_mm` from the axis, mm; beyond the rim those of the rim. On an
+    /// edge the flatter of its two slopes, and 0 on the axis.
+    #[inline]
+    pub(crate) fn height_and_slope(&self, r_mm: f64) -> (f64, f64) {
+        let piece = self.pieces.iter().find(|piece| r_mm <= piece.to).or(self.pieces.last());
+        piece.map_or((0.0, 0.0), |piece| {
+            let r_mm = r_mm.min(piece.to);
+            (piece.height(r_mm), if r_mm > 0.0 { piece.slope(r_mm) } else { 0.0 })
+        })
+    }
+
     /// Distance from the axis at which a plane of this slope (rise over run, not negative) touches the end, mm.
     pub fn touch(&self, slope: f64) -> f64 {
         if slope <= 0.0 {
@@ -183,12 +194,57 @@ impl Turned {
         self.radius_mm
     }
 
+    /// [`Turned::touch`] for many slopes at once, and the height there above the tip, mm: the slope never falls from piece
+    /// to piece, so each adds what a contact has passed of it.
+    #[inline(always)]
+    pub(crate) fn touch_all(&self, slopes: &[f64], r_mm: &mut [f64], height_mm: &mut [f64]) {
+        r_mm.fill(0.0);
+        height_mm.fill(0.0);
+        for piece in &self.pieces {
+            let (from, to) = (piece.from, piece.to);
+            match piece.form {
+                Form::Line { slope: rise, .. } => {
+                    for (&slope, (r_mm, height_mm)) in
+                        slopes.iter().zip(r_mm.iter_mut().zip(height_mm.iter_mut()))
+                    {
+                        let passed = if slope > rise { to - from } else { 0.0 };
+                        *r_mm += passed;
+                        *height_mm += rise * passed;
+                    }
+                }
+                Form::Arc { r, radius, .. } => {
+                    let (near, far) = (from - r, to - r);
+                    let deepest = (radius * radius - near * near).max(0.0).sqrt();
+                    for (&slope, (r_mm, height_mm)) in
+                        slopes.iter().zip(r_mm.iter_mut().zip(height_mm.iter_mut()))
+                    {
+                        let off = radius * slope / (1.0 + slope * slope).sqrt();
+                        let off = if off > near { off } else { near };
+                        let off = if off < far { off } else { far };
+                        *r_mm += off - near;
+                        *height_mm += deepest - (radius * radius - off * off).max(0.0).sqrt();
+                    }
+                }
+            }
+        }
+    }
+
     /// On a straight line that passes the axis at the distance `aside` >= 0: how far from the foot of the axis a line of
     /// this slope (rise over run, not negative) touches the end, mm; the end of the chord where it does not.
     ///
     /// The profile along the line is convex: the contact is in the first piece at whose outer end the profile is as
     /// steep as the line.
     pub fn touch_along(&self, aside: f64, slope: f64) -> f64 {
+        self.touch_along_between(aside, slope, [0.0, f64::INFINITY])
+    }
+
+    /// [`Turned::touch_along`] where it is known to lie between two distances from the foot, mm.
+    pub(crate) fn touch_along_between(
+        &self,
+        aside: f64,
+        slope: f64,
+        [least, most]: [f64; 2],
+    ) -> f64 {
         if slope <= 0.0 {
             return 0.0;
         }
@@ -214,7 +270,9 @@ impl Turned {
                     (radius * radius - q2).max(0.0).sqrt() * sine(slope)
                 }
                 Form::Arc { r, radius, .. } => {
-                    let (lo, hi) = (piece.from.max(aside) - r, piece.to - r);
+                    let away = |along: f64| (q2 + along * along).sqrt();
+                    let lo = piece.from.max(away(least)) - r;
+                    let hi = piece.to.min(away(most)).max(lo + r) - r;
                     along(r + torus(r, radius, aside, slope, lo, hi))
                 }
             };
@@ -312,7 +370,10 @@ impl Turned {
 /// the bracket, halves it.
 fn torus(r: f64, radius: f64, aside: f64, slope: f64, mut lo: f64, mut hi: f64) -> f64 {
     let (q2, g2, p2) = (aside * aside, slope * slope, radius * radius);
-    let mut u = (radius * sine(slope)).clamp(lo, hi);
+    let mut u = radius * sine(slope);
+    if !(u > lo && u < hi) {
+        u = 0.5 * (lo + hi);
+    }
     for step in 0..MOST_STEPS {
         let at = r + u;
         let chord = at * at - q2;

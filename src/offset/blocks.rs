@@ -92,16 +92,27 @@ impl Fan {
         bounds
     }
 
-    /// [`Fan::bounds`] for any convex form: the highest node over the nearest point.
+    /// [`Fan::bounds`] for any convex form: the form lies above its tangent plane over the middle of the block.
     fn bounds_of(&self, form: &Turned, corner: DVec2, side_mm: f64) -> [f32; LANES] {
         let half = 0.5 * side_mm;
         let mut bounds = [f32::NEG_INFINITY; LANES];
         for (lane, out) in bounds.iter_mut().enumerate() {
             let cell = DVec2::new((lane % FAN) as f64 + 0.5, (lane / FAN) as f64 + 0.5);
-            let near = ((corner + cell * side_mm).abs() - half).max(DVec2::ZERO).length();
+            let middle = corner + cell * side_mm;
+            let near = (middle.abs() - half).max(DVec2::ZERO).length();
             if self.top[lane] > f32::NEG_INFINITY && near <= form.radius_mm() + TOUCH_MM {
                 let rise = form.height((near - TOUCH_MM).max(0.0)) as f32;
                 *out = self.top[lane] - rise + ROUND_OFF * (self.top[lane].abs() + rise);
+                let away = middle.length();
+                if away <= form.radius_mm() {
+                    let (rise, slope) = form.height_and_slope(away);
+                    let steepest = middle * (slope / away.max(TOUCH_MM));
+                    let lift = f64::from(self.lift[lane]);
+                    let fall = half * (self.slope(lane) - steepest).abs().element_sum();
+                    let off = f64::from(ROUND_OFF) * (lift.abs() + rise + fall);
+                    let fine = (lift - rise + fall + off) as f32;
+                    *out = if fine < *out { fine } else { *out };
+                }
             }
         }
         bounds

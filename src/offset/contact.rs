@@ -24,17 +24,32 @@ pub(super) struct Cell {
 }
 
 impl Cell {
-    /// Tip height at which the cutter touches the two facets and five edges of the cell.
-    pub(super) fn touch(&self, profile: &Profile) -> f64 {
-        let [z00, z10, z01, z11] = self.z;
+    /// Tip height at which the cutter touches the two facets and five edges of the cell. Contacts on the inside of edges
+    /// that are no higher than `floor` may be left out, and so may vertices of convex forms.
+    pub(super) fn touch(&self, profile: &Profile, floor: f64) -> f64 {
         let (a, p) = (self.at, self.pitch_mm);
         let (b, c, d) = (a + DVec2::X * p, a + DVec2::Y * p, a + DVec2::splat(p));
-        self.touch_facets(profile)
-            .max(edge(profile, a, z00, b, z10))
-            .max(edge(profile, a, z00, c, z01))
-            .max(edge(profile, a, z00, d, z11))
-            .max(edge(profile, b, z10, d, z11))
-            .max(edge(profile, c, z01, d, z11))
+        let mut best = self.touch_facets(profile);
+        let ends = [a, b, c, d];
+        let edges = [(0, 1), (0, 2), (0, 3), (1, 3), (2, 3)];
+        if let Profile::Turned(form) = profile
+            && ends.iter().all(|end| end.length() <= form.radius_mm())
+        {
+            let heights = ends.map(|end| form.height_and_slope(end.length()));
+            for (from, to) in edges {
+                let floor = best.max(floor);
+                let end = |n: usize| End { at: ends[n], z: self.z[n], profile: heights[n] };
+                if bends_above(&end(from), &end(to), floor) {
+                    let (a, b) = (ends[from], ends[to]);
+                    best = best.max(edge(profile, a, self.z[from], b, self.z[to]));
+                }
+            }
+            return best;
+        }
+        for (from, to) in edges {
+            best = best.max(edge(profile, ends[from], self.z[from], ends[to], self.z[to]));
+        }
+        best
     }
 
     /// Tip height at which the cutter touches the inside of one of the two facets.
@@ -72,6 +87,36 @@ impl Cell {
         }
         best
     }
+}
+
+/// An end of an edge: its place, its height, and the height and the slope of the profile there.
+struct End {
+    at: DVec2,
+    z: f64,
+    profile: (f64, f64),
+}
+
+/// Whether a convex form may touch the inside of an edge higher than its ends and `floor`.
+///
+/// The edge minus the profile is concave: it lies below its tangents at both ends.
+fn bends_above(a: &End, b: &End, floor: f64) -> bool {
+    let length = (b.at - a.at).length();
+    let along = (b.at - a.at) / length;
+    let slope = (b.z - a.z) / length;
+    let rise = |end: &End| {
+        let away = end.at.length();
+        if away > 0.0 { end.profile.1 * (along.dot(end.at) / away) } else { 0.0 }
+    };
+    let (up, down) = (slope - rise(a), rise(b) - slope);
+    if up <= 0.0 || down <= 0.0 {
+        return false;
+    }
+    let (tip_a, tip_b) = (a.z - a.profile.0, b.z - b.profile.0);
+    let most = (tip_a + up * length).min(tip_b + down * length);
+    let meet = (tip_a * down + tip_b * up + up * down * length) / (up + down);
+    // Near the rim the tangents may be too steep for the second bound: no number rules nothing out.
+    let below = meet + TOUCH_MM <= floor;
+    most + TOUCH_MM > floor && !below
 }
 
 /// Tip height at which the cutter touches the edge from `a` to `b`, ends included.

@@ -21,9 +21,6 @@ const FEW: usize = 2;
 /// Nodes of a row that are looked at together in `f32`; a leaf has fewer.
 const GLANCE: usize = 8;
 
-/// Relative rounding of heights in `f32`.
-const KNOWN_SLACK: f64 = 2.5e-7;
-
 /// A ball is looked at cell by cell where its half chord is below this part of its radius.
 const STEEP_CHORD: f64 = 0.35;
 
@@ -66,19 +63,19 @@ impl<'a> Dropper<'a> {
     /// The lowest height of the tip at `p` at which the cutter touches but does not enter the surface,
     /// mm; [`f64::NEG_INFINITY`] where the cutter overlaps nothing. Exact to round-off.
     pub fn drop(&self, p: DVec2) -> f64 {
-        self.search(&self.profile, p, None, f64::NEG_INFINITY).0
+        self.search(&self.profile, p, None).0
     }
 
     /// True when the tip may be at height `z_mm` over `p`, as [`Dropper::drop`] says, but much cheaper where it may.
     pub fn clears(&self, p: DVec2, z_mm: f64) -> bool {
-        self.search(&self.profile, p, None, z_mm).0 <= z_mm
+        self.search_above(&self.profile, p, None, z_mm).0 <= z_mm
     }
 
     /// The highest point of the surface under the closed disc of the cutter at `p`, mm;
     /// [`f64::NEG_INFINITY`] where it overlaps nothing.
     pub fn highest_under(&self, p: DVec2) -> f64 {
         let disc = Profile::Flat { radius_mm: self.profile.radius_mm() };
-        self.search(&disc, p, None, f64::NEG_INFINITY).0
+        self.search(&disc, p, None).0
     }
 
     /// Drops at even distances of at most `step_mm` on the straight line from `a` to `b`, both ends
@@ -91,28 +88,25 @@ impl<'a> Dropper<'a> {
         for k in 0..=steps {
             let t = k as f64 / steps as f64;
             let p = a + (b - a) * t;
-            let (tip, leaf) = self.search(&self.profile, p, near, f64::NEG_INFINITY);
+            let (tip, leaf) = self.search(&self.profile, p, near);
             near = (tip > f64::NEG_INFINITY).then_some(leaf);
             out.push((t * length, tip));
         }
     }
 
-    /// Raises the heights `tip` of a row of nodes, which are known to be reached, to the exact drops.
-    pub(super) fn raise_row(&self, row: usize, tip: &mut [f32]) {
-        let mut near = None;
-        for (i, tip) in tip.iter_mut().enumerate() {
-            // Single precision may have rounded it up.
-            let known = f64::from(*tip) - KNOWN_SLACK * f64::from(tip.abs());
-            let p = self.surface.grid().node(i, row);
-            let (exact, leaf) = self.search(&self.profile, p, near, known);
-            near = (exact > f64::NEG_INFINITY).then_some(leaf);
-            *tip = tip.max(exact as f32) + 0.0;
-        }
+    /// The tip and the leaf of the contact; `near` is a leaf that may lie close to it.
+    fn search(&self, profile: &Profile, p: DVec2, near: Option<Block>) -> (f64, Block) {
+        self.search_above(profile, p, near, f64::NEG_INFINITY)
     }
 
-    /// The tip and the leaf of the contact; `near` is a leaf that may lie close to it. Contacts below `known` need not be
-    /// found.
-    fn search(&self, profile: &Profile, p: DVec2, near: Option<Block>, known: f64) -> (f64, Block) {
+    /// [`Dropper::search`]; contacts that are no higher than `known_mm` need not be found.
+    fn search_above(
+        &self,
+        profile: &Profile,
+        p: DVec2,
+        near: Option<Block>,
+        known_mm: f64,
+    ) -> (f64, Block) {
         let mut search = Search {
             surface: self.surface,
             levels: &self.levels,
@@ -120,7 +114,7 @@ impl<'a> Dropper<'a> {
             radius_mm: profile.radius_mm(),
             p,
             best: f64::NEG_INFINITY,
-            floor: known,
+            floor: known_mm,
             best_leaf: (0, 0),
             waiting: [(0.0, (0, 0)); WAITING],
             waiting_len: 0,
@@ -422,11 +416,36 @@ impl Search<'_> {
             for i in x * FAN..(x * FAN + FAN).min(nx - 1) {
                 let cell = self.cell(i, j);
                 let top = cell.z.into_iter().fold(f64::NEG_INFINITY, f64::max);
-                if top > self.floor && self.tip_below(top, self.nearest((i, j), 1)) > self.floor {
-                    self.raise(cell.touch(self.profile), (x, y));
+                if top > self.floor
+                    && self.tip_below(top, self.nearest((i, j), 1)) > self.floor
+                    && self.ceiling(&cell) > self.floor
+                {
+                    self.raise(cell.touch(self.profile, self.floor), (x, y));
                 }
             }
         }
+    }
+
+    /// A height that no tip over a contact in the cell exceeds: a convex form lies above its tangent plane over the
+    /// middle, and what a facet stands above that is highest at a corner.
+    #[inline]
+    fn ceiling(&self, cell: &Cell) -> f64 {
+        let Profile::Turned(form) = self.profile else { return f64::INFINITY };
+        let half = 0.5 * cell.pitch_mm;
+        let middle = cell.at + half;
+        let away = middle.length();
+        if away > self.radius_mm {
+            return f64::INFINITY;
+        }
+        let (rise, slope) = form.height_and_slope(away);
+        if !slope.is_finite() {
+            return f64::INFINITY;
+        }
+        let fall = middle * (slope * half / away.max(TOUCH_MM));
+        let (along, against) = (fall.x + fall.y, fall.x - fall.y);
+        let [z00, z10, z01, z11] = cell.z;
+        let above = (z00 + along).max(z11 - along).max((z10 - against).max(z01 + against));
+        above - rise + TOUCH_MM * (1.0 + slope)
     }
 
     /// Touches the facets and edges of a leaf, well inside a ball, that may beat the best contact.

@@ -7,17 +7,27 @@
 
 use rayon::prelude::*;
 
+use super::scatter::Ball;
 use super::simd::{self, Path};
 use crate::cutter::Profile;
 
-/// Rows that one task writes.
+/// Rows that are folded at a time.
 const BAND_ROWS: usize = 128;
+
+/// Rows that one task writes if its nodes may be scattered: the fewer the bands, the fewer sources lie in two of them.
+const SCATTER_ROWS: usize = 4 * BAND_ROWS;
+
+/// Reach in nodes of the balls that may be scattered: smaller ones cost too little, larger ones are beyond the
+/// slack for single precision.
+const SCATTER_REACH: std::ops::RangeInclusive<usize> = 40..=4000;
 
 /// A quarter of an upside-down cutter at the nodes: minus its height at (dx, dy) nodes from the axis.
 #[derive(Debug)]
 pub(super) struct Quarter {
     /// For every dy the values for dx = 0, 1, ... as far as the cutter reaches.
-    rows: Vec<Vec<f32>>,
+    pub rows: Vec<Vec<f32>>,
+    /// The whole of a large ball.
+    ball: Option<Ball>,
 }
 
 impl Quarter {
@@ -31,37 +41,90 @@ impl Quarter {
             let within = r <= radius + super::contact::TOUCH_MM;
             within.then(|| profile.height_at(r.min(radius)).map(|z| -z as f32)).flatten()
         };
-        let rows = (0..=reach)
+        let rows: Vec<Vec<f32>> = (0..=reach)
             .map(|dy| (0..=reach).map_while(|dx| depth(dx, dy)).collect())
             .filter(|row: &Vec<f32>| !row.is_empty())
             .collect();
-        Self { rows }
+        let whole = SCATTER_REACH.contains(&reach) && reach < limit;
+        let ball = match *profile {
+            Profile::Ball { radius_mm } if whole => Some(Ball::new(&rows, radius_mm, pitch_mm)),
+            _ => None,
+        };
+        Self { rows, ball }
     }
 
     /// The farthest node along an axis.
-    fn reach(&self) -> usize {
+    pub(super) fn reach(&self) -> usize {
         self.rows.len() - 1
     }
+}
+
+/// On which side of a field the cutter lies.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Side {
+    /// Above it: at every node p the highest of z(q) - profile(|p - q|) over the nodes q within reach.
+    Above,
+    /// Below it: the lowest of z(q) + profile(|p - q|).
+    Below,
+}
+
+impl Side {
+    /// Turns heights over, so that the side is `Above`; done twice it gives them back.
+    #[inline(always)]
+    pub(super) fn turn(self, z: f32) -> f32 {
+        match self {
+            Self::Above => z,
+            Self::Below => -z + 0.0,
+        }
+    }
+}
+
+/// What a dilation reads.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Dilation<'a> {
+    pub quarter: &'a Quarter,
+    pub side: Side,
+    /// Heights, row by row.
+    pub z: &'a [f32],
+    pub nx: usize,
 }
 
 /// The rows that one task writes, and what it reads.
 #[derive(Debug)]
 pub(super) struct Band<'a> {
-    quarter: &'a Quarter,
-    z: &'a [f32],
-    nx: usize,
-    first_row: usize,
-    out: &'a mut [f32],
+    pub of: Dilation<'a>,
+    pub first_row: usize,
+    pub out: &'a mut [f32],
 }
 
-/// max over the nodes q within reach of z(q) - profile(|p - q|), at every node p.
-pub(super) fn fold(path: Path, quarter: &Quarter, z: &[f32], nx: usize) -> Vec<f32> {
-    let mut out = vec![f32::NEG_INFINITY; z.len()];
-    out.par_chunks_mut(BAND_ROWS * nx).enumerate().for_each(|(band, out)| {
-        let first_row = band * BAND_ROWS;
-        simd::fold_band(path, &mut Band { quarter, z, nx, first_row, out });
+/// How a large ball is dilated; the result is the same.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Way {
+    /// In every band the way that costs less.
+    Cheaper,
+    #[cfg(test)]
+    Fold,
+    #[cfg(test)]
+    Scatter,
+}
+
+/// Dilates the field at the nodes of the rows `first_row`, ...; no other copy of them is made.
+pub(super) fn dilate(path: Path, of: &Dilation, way: Way, first_row: usize, out: &mut [f32]) {
+    let ball = of.quarter.ball.as_ref();
+    #[cfg(test)]
+    let ball = ball.filter(|_| way != Way::Fold);
+    let rows = if ball.is_some() { SCATTER_ROWS } else { BAND_ROWS };
+    out.par_chunks_mut(rows * of.nx).enumerate().for_each(|(band, out)| {
+        let first_row = first_row + band * rows;
+        let mut band = Band { of: *of, first_row, out };
+        if ball.is_some_and(|ball| simd::scatter_band(path, &mut band, ball, way)) {
+            return;
+        }
+        for (part, out) in band.out.chunks_mut(BAND_ROWS * of.nx).enumerate() {
+            let first_row = first_row + part * BAND_ROWS;
+            simd::fold_band(path, &mut Band { of: *of, first_row, out });
+        }
     });
-    out
 }
 
 /// Columns of a [`Lane16`].
@@ -122,9 +185,9 @@ fn sum_two<const N: usize>(pairs: &[[Lane16; N]], near: &[f32], far: &[f32]) -> 
 /// Folds one band, `N` times sixteen columns at a time.
 #[inline(always)]
 pub(super) fn fold_band<const N: usize>(band: &mut Band) {
-    let (nx, rows, width) = (band.nx, band.out.len() / band.nx, N * LANES);
-    let ny = band.z.len() / nx;
-    let (y0, reach) = (band.first_row, band.quarter.reach());
+    let Dilation { quarter, side, z, nx } = band.of;
+    let (rows, ny, width) = (band.out.len() / nx, z.len() / nx, N * LANES);
+    let (y0, reach) = (band.first_row, quarter.reach());
     let mut tile = vec![[Lane16::EMPTY; N]; rows];
     let mut pairs = vec![[Lane16::EMPTY; N]; reach + 1];
     let mut line = vec![f32::NEG_INFINITY; width + 2 * reach];
@@ -135,7 +198,9 @@ pub(super) fn fold_band<const N: usize>(band: &mut Band) {
         let at = from + reach - x0;
         line.fill(f32::NEG_INFINITY);
         for y in y0.saturating_sub(reach)..(y0 + rows + reach).min(ny) {
-            line[at..at + to - from].copy_from_slice(&band.z[y * nx + from..y * nx + to]);
+            for (line, &z) in line[at..at + to - from].iter_mut().zip(&z[y * nx + from..]) {
+                *line = side.turn(z);
+            }
             for (dx, pair) in pairs.iter_mut().enumerate() {
                 let left = line[reach - dx..reach - dx + width].as_chunks().0;
                 let right = line[reach + dx..reach + dx + width].as_chunks().0;
@@ -147,8 +212,8 @@ pub(super) fn fold_band<const N: usize>(band: &mut Band) {
             // pair is loaded once for both.
             let nearest = y0.saturating_sub(y).max((y + 1).saturating_sub(y0 + rows));
             for dy in (nearest..=reach).step_by(2) {
-                let near = &band.quarter.rows[dy][..];
-                let far = band.quarter.rows.get(dy + 1).map_or(&[][..], |far| far);
+                let near = &quarter.rows[dy][..];
+                let far = quarter.rows.get(dy + 1).map_or(&[][..], |far| far);
                 let sums = sum_two(&pairs, near, far);
                 for (dy, sum) in [dy, dy + 1].into_iter().zip(&sums) {
                     if y + dy >= y0 && y + dy < y0 + rows {
@@ -169,7 +234,9 @@ pub(super) fn fold_band<const N: usize>(band: &mut Band) {
         let width = width.min(nx - x0);
         for (row, tile) in band.out.chunks_exact_mut(nx).zip(&tile) {
             for (row, lanes) in row[x0..x0 + width].chunks_mut(LANES).zip(tile) {
-                row.copy_from_slice(&lanes.0[..row.len()]);
+                for (z, &lane) in row.iter_mut().zip(&lanes.0) {
+                    *z = side.turn(lane);
+                }
             }
         }
     }

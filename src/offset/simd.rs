@@ -6,7 +6,8 @@
 //! the baseline and needs no choice.
 
 use super::exact::{self, FacetRow};
-use super::fold::{self, Band};
+use super::fold::{self, Band, Way};
+use super::scatter::{self, Ball};
 
 /// An instruction set that the kernels are compiled for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -65,6 +66,32 @@ fn fold_band_avx512(band: &mut Band) {
 #[target_feature(enable = "avx2")]
 fn fold_band_avx2(band: &mut Band) {
     fold::fold_band::<2>(band);
+}
+
+/// [`scatter::scatter_band`] on a path.
+#[allow(unsafe_code, reason = "a function compiled for more than the baseline is unsafe to call")]
+pub(super) fn scatter_band(path: Path, band: &mut Band, ball: &Ball, way: Way) -> bool {
+    match path {
+        // SAFETY: `Path::available` is the only source of this path and has seen AVX-512F.
+        #[cfg(target_arch = "x86_64")]
+        Path::Avx512 => unsafe { scatter_band_avx512(band, ball, way) },
+        // SAFETY: `Path::available` is the only source of this path and has seen AVX2.
+        #[cfg(target_arch = "x86_64")]
+        Path::Avx2 => unsafe { scatter_band_avx2(band, ball, way) },
+        Path::Baseline => scatter::scatter_band(band, ball, way),
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx512f")]
+fn scatter_band_avx512(band: &mut Band, ball: &Ball, way: Way) -> bool {
+    scatter::scatter_band(band, ball, way)
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+fn scatter_band_avx2(band: &mut Band, ball: &Ball, way: Way) -> bool {
+    scatter::scatter_band(band, ball, way)
 }
 
 /// [`exact::tilt_row`] on a path.

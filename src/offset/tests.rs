@@ -1,6 +1,7 @@
 //! The offset against a plain drop cutter that shares no code with it.
 
-use super::field::{nodes_only, tip_field_on};
+use super::field::{least_left, nodes_only, tip_field_on};
+use super::fold::{Dilation, Quarter, Side, Way, dilate};
 use super::simd::Path;
 use super::*;
 use crate::cutter::Profile;
@@ -297,6 +298,30 @@ fn the_tip_field_is_the_exact_drop_at_every_node() {
     }
 }
 
+/// Of any size, on bigger fields than the plain drop cutter can take.
+#[test]
+fn the_tip_field_of_convex_forms_is_the_exact_drop_at_every_node() {
+    let forms = convex_forms();
+    let pitches = [0.1, 0.4, 1.7];
+    for (n, (name, surface)) in surfaces(36, 0.1).into_iter().enumerate() {
+        for (k, profile) in forms.iter().enumerate() {
+            let grid = grid(36, 27, pitches[(n + k) % pitches.len()]);
+            let surface = Heightfield::from_z(grid, surface.z().to_vec());
+            let tip = tip_field(&surface, profile);
+            let dropper = Dropper::new(&surface, profile.clone());
+            for j in (0..grid.ny).step_by(2) {
+                for i in 0..grid.nx {
+                    let (got, want) = (f64::from(tip.at(i, j)), dropper.drop(grid.node(i, j)));
+                    assert!(
+                        (got - want).abs() < 1e-6,
+                        "{name}, {profile:?} at ({i}, {j}): {got}, exact {want}"
+                    );
+                }
+            }
+        }
+    }
+}
+
 #[test]
 fn one_and_two_threads_and_every_instruction_set_give_the_same_bits() {
     let bits = |field: &[f32]| field.iter().map(|z| z.to_bits()).collect::<Vec<_>>();
@@ -324,8 +349,12 @@ fn dilation_and_closing_are_their_definitions() {
         for profile in plain.into_iter().chain(convex) {
             let grid = surface.grid();
             let node = |n: usize| grid.node(n % grid.nx, n / grid.nx);
-            let fields: Vec<_> =
-                Path::available().map(|path| nodes_only(path, &surface, &profile)).collect();
+            let field = |path: Path| {
+                let mut tip = vec![0.0; grid.len()];
+                nodes_only(path, &surface, &profile, 0, &mut tip);
+                tip
+            };
+            let fields: Vec<_> = Path::available().map(field).collect();
             let left = closing(&surface, &profile);
             for n in 0..grid.len() {
                 let (mut high, mut low) = (f64::NEG_INFINITY, f64::INFINITY);
@@ -340,6 +369,64 @@ fn dilation_and_closing_are_their_definitions() {
                 }
                 assert!((f64::from(left.z()[n]) - low).abs() < 1e-6, "{name} {profile:?} {n}");
             }
+        }
+    }
+}
+
+/// Scatters a ball of so many nodes on both sides of a field and compares it, bit by bit, with the fold.
+fn compare_scatter(name: &str, surface: &Heightfield, nodes: f64) {
+    let grid = surface.grid();
+    let ball = Profile::Ball { radius_mm: nodes * grid.pitch_mm };
+    let quarter = &Quarter::new(&ball, grid.pitch_mm, 10_000);
+    for side in [Side::Above, Side::Below] {
+        let of = Dilation { quarter, side, z: surface.z(), nx: grid.nx };
+        let first_row = if side == Side::Above { 0 } else { grid.ny / 3 };
+        let field = |path: Path, way: Way| {
+            let mut out = vec![0.25_f32; (grid.ny - first_row) * grid.nx];
+            dilate(path, &of, way, first_row, &mut out);
+            out
+        };
+        let want = field(Path::best(), Way::Fold);
+        for path in Path::available() {
+            for way in [Way::Scatter, Way::Cheaper] {
+                assert!(
+                    field(path, way) == want,
+                    "{name}, {nodes} nodes, {side:?} {path:?} {way:?}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn scattering_a_ball_gives_the_very_heights_of_the_fold() {
+    for (name, surface) in surfaces(90, 0.1) {
+        for nodes in [40.0, 47.37, 85.2] {
+            compare_scatter(name, &surface, nodes);
+        }
+    }
+    // More than one band.
+    let (name, surface) = surfaces(750, 0.02).swap_remove(3);
+    compare_scatter(name, &surface, 41.9);
+}
+
+#[test]
+fn what_cutters_leave_is_the_same_in_one_piece_and_in_stretches() {
+    let bits = |field: &Heightfield| field.z().iter().map(|z| z.to_bits()).collect::<Vec<_>>();
+    let cutters =
+        [Profile::Ball { radius_mm: 0.61 }, FLAT_3.slimmed(0.8), convex_forms().swap_remove(4)];
+    for (name, surface) in surfaces(70, 0.1) {
+        let mut want = closing(&tip_field(&surface, &cutters[0]), &cutters[0]);
+        for profile in &cutters[1..] {
+            let closed = closing(&tip_field(&surface, profile), profile);
+            for (want, closed) in want.z_mut().iter_mut().zip(closed.z()) {
+                *want = want.min(*closed);
+            }
+        }
+        let cuts: Vec<_> = cutters.iter().map(|profile| (&surface, profile.clone())).collect();
+        for stretch_nodes in [1, 70 * 29, 70 * 1000] {
+            let got = least_left(*surface.grid(), &cuts, stretch_nodes);
+            assert!(bits(&got) == bits(&want), "{name}, {stretch_nodes}");
         }
     }
 }
@@ -415,6 +502,24 @@ proptest! {
         let p = b.min + b.size() * DVec2::new(x, y);
         let (got, want) = (Dropper::new(&surface, profile.clone()).drop(p), oracle(&surface, &profile, p));
         prop_assert!(got == want || (got - want).abs() < 1e-6, "{} {}", got, want);
+    }
+
+    #[test]
+    fn scattering_a_ball_gives_the_very_heights_of_the_fold_anywhere(
+        waves in proptest::collection::vec((0.0f64..0.4, 0.0f64..6.3, 0.0f64..6.3), 1..5),
+        height_mm in -1.0f64..4.0, far_mm in -300.0f64..300.0, nodes in 40.0f64..70.0,
+        pitch_mm in 0.02f64..0.5, wall in -1.0f64..1.0,
+    ) {
+        let surface = Heightfield::from_fn(grid(64, 57, pitch_mm), |p| {
+            let p = p / pitch_mm;
+            let wave = |&(often, turn, phase): &(f64, f64, f64)| {
+                let along = p.x * libm::cos(turn) + p.y * libm::sin(turn);
+                libm::sin(along * often + phase)
+            };
+            let step = if p.x * 0.6 + p.y * 0.8 > 30.0 { wall } else { 0.0 };
+            far_mm + step.max(0.0) + libm::exp2(height_mm) * 4.0 * pitch_mm * waves.iter().map(wave).sum::<f64>()
+        });
+        compare_scatter("waves", &surface, nodes);
     }
 
     #[test]
