@@ -249,7 +249,9 @@ impl Sender {
         let line = self.about();
         let dwells: f64 = self.unanswered.iter().map(|k| self.lines[*k].dwell_s).sum();
         match &self.phase {
-            Phase::Sending | Phase::Ending(_) if now_s - self.heard_s > SILENCE_S => {
+            Phase::Sending | Phase::Ending(_)
+                if now_s - self.heard_s > SILENCE_S && !self.is_homing() =>
+            {
                 self.brake(StreamError::Silent { line, seconds: SILENCE_S as u32 }, now_s)
             }
             Phase::Sending if self.idle_since_s.is_some_and(|s| now_s - s > LOST_S + dwells) => {
@@ -267,6 +269,11 @@ impl Sender {
             }
             _ => Vec::new(),
         }
+    }
+
+    /// While homing the controller answers nothing, not even `?`.
+    fn is_homing(&self) -> bool {
+        self.unanswered.front().is_some_and(|k| self.lines[*k].text == "$H")
     }
 
     /// Begins to stop; nothing more of the program is sent.

@@ -92,6 +92,23 @@ fn a_long_dwell_is_no_lost_answer() {
 }
 
 #[test]
+fn homing_is_silent_and_no_fault() {
+    let mut store = Store::default();
+    store.set(22, 1.0).unwrap();
+    let mut c = Controller::new(store);
+    let mut sender = Sender::new(prepare("$H\nG1 X-5 F400\n").unwrap(), 0.0);
+    c.advance(STEP_S);
+    c.take_output();
+    while sender.outcome().is_none() && c.now_s() < PATIENCE_S {
+        let heard = c.take_output();
+        c.feed(&sender.step(c.now_s(), &heard));
+        c.advance(STEP_S);
+    }
+    assert_eq!(sender.outcome(), Some(&Outcome::Done));
+    assert_eq!(c.position_mm().x, -5.0);
+}
+
+#[test]
 fn what_may_not_be_sent_is_refused_before_anything_is() {
     let bad = |text: &str| prepare(text).unwrap_err();
     assert_eq!(bad("G21\nG0 X1!\n"), StreamError::BadCharacter { line: 2, character: '!' });
@@ -166,4 +183,43 @@ fn program(deeds: &[(f64, f64, i32)], feed: u32) -> (String, DVec3) {
         }
     }
     (text, end)
+}
+
+/// Seconds from the first line to the last step, sent over the wire to the simulated controller.
+fn streamed_s(text: &str) -> f64 {
+    let mut store = Store::default();
+    for (number, value) in [(110, 5000.0), (111, 5000.0), (112, 2000.0), (30, 24000.0)] {
+        store.set(number, value).unwrap();
+    }
+    for (number, value) in [(120, 300.0), (121, 300.0), (122, 200.0)] {
+        store.set(number, value).unwrap();
+    }
+    let mut c = Controller::new(store);
+    c.take_output();
+    let mut sender = Sender::new(prepare(text).unwrap(), 0.0);
+    let mut last_step_s = 0.0;
+    while sender.outcome().is_none() {
+        let heard = c.take_output();
+        c.feed(&sender.step(c.now_s(), &heard));
+        c.advance(STEP_S);
+        if c.is_in_motion() {
+            last_step_s = c.now_s();
+        }
+        assert!(c.now_s() < PATIENCE_S);
+    }
+    assert_eq!(sender.outcome(), Some(&Outcome::Done));
+    last_step_s
+}
+
+/// Times of the firmware itself (GRBL 1.1h run on a virtual clock).
+#[test]
+fn a_streamed_program_takes_the_time_of_the_firmware() {
+    for (text, firmware_s) in [
+        (include_str!("../../tests/data/planner/a_dense_raster.nc"), 31.226),
+        (include_str!("../../tests/data/planner/c_arcs.nc"), 115.379),
+    ] {
+        let seconds = streamed_s(text);
+        println!("{seconds:.3} s, firmware {firmware_s} s");
+        assert!((seconds / firmware_s - 1.0).abs() < 0.01, "{seconds} s, firmware {firmware_s} s");
+    }
 }
