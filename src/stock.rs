@@ -21,6 +21,10 @@ pub struct Contact {
     pub deepest_mm: f32,
     /// Largest height of wood above the tip at a node where the move removed wood, mm: what the flutes must reach.
     pub engaged_mm: f32,
+    /// Thickness of the thickest chip, in feeds of a tooth: the forward part of the normal of the cutter's surface where it
+    /// first meets wood, 1 = straight ahead. For level moves exact at the nodes, for others rather too much; 0 for
+    /// plunges and retracts.
+    pub chip: f32,
 }
 
 impl Contact {
@@ -30,6 +34,7 @@ impl Contact {
         Self {
             deepest_mm: self.deepest_mm.max(other.deepest_mm),
             engaged_mm: self.engaged_mm.max(other.engaged_mm),
+            chip: self.chip.max(other.chip),
         }
     }
 }
@@ -63,6 +68,9 @@ const RAPID_SLIM_MM: f64 = 1e-5;
 
 /// Less than this removed at a node does not count as engagement, mm (rounding of the stored heights).
 const ENGAGED_FROM_MM: f64 = 1e-3;
+
+/// Less than this removed at a node makes no chip that counts, mm: cusps of earlier passes.
+const CHIP_FROM_MM: f64 = 0.02;
 
 impl Block {
     /// The uncut blank, flat at z = 0, on `grid`.
@@ -316,9 +324,14 @@ impl Band<'_> {
                 if new < old {
                     row[i] = new;
                     contact.deepest_mm = contact.deepest_mm.max(old - new);
-                    if f64::from(old) - left.z > ENGAGED_FROM_MM {
+                    let removed_mm = f64::from(old) - left.z;
+                    if removed_mm > ENGAGED_FROM_MM {
                         let engaged = (f64::from(old) - left.tip) as f32;
                         contact.engaged_mm = contact.engaged_mm.max(engaged);
+                    }
+                    if removed_mm > CHIP_FROM_MM {
+                        let chip = sweep.chip(f64::from(old) - left.tip, left.beside) as f32;
+                        contact.chip = contact.chip.max(chip);
                     }
                 }
             });

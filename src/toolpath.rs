@@ -155,8 +155,6 @@ struct Site<'a> {
     fresh: bool,
     /// True when an earlier operation has finished some ground.
     finished: bool,
-    /// True when other operations follow.
-    later: bool,
 }
 
 impl Site<'_> {
@@ -226,7 +224,6 @@ fn plan_from(
             number: index + 1,
             fresh: fresh && paths.is_empty(),
             finished: job.operations[..index].iter().any(|o| kind_name(o) == "finish"),
-            later: index + 1 < total,
         };
         let kind = kind_name(operation);
         let cutter = operation.cutter.name.clone();

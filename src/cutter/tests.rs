@@ -13,7 +13,7 @@ fn profiles_have_their_analytic_heights() {
     assert_eq!(flat.height_at(3.001), None);
 }
 
-fn spec(shape: CutterShape, diameter_mm: f64) -> CutterSpec {
+pub(crate) fn spec(shape: CutterShape, diameter_mm: f64) -> CutterSpec {
     CutterSpec {
         name: "test".into(),
         shape,

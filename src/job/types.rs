@@ -491,25 +491,24 @@ pub struct Operation {
 }
 
 impl Operation {
-    /// The feed at which a cut of this thickness makes chips no thicker than the ones that `feed_mm_per_min` stands for,
-    /// mm/min.
+    /// The feed at which a cut makes chips no thicker than the ones that `feed_mm_per_min` stands for, mm/min; `thickness_mm`:
+    /// of the wood, `chip`: thickness of the thickest chip in feeds of a tooth (`Contact::chip` of the stock).
     ///
-    /// A round end that takes little wood cuts with the part near its tip, where the edge meets the wood under a flat angle k:
-    /// the chip is thinner by sin k, cos k = 1 - thickness / radius (axial chip thinning). `feed_mm_per_min` is for a third
-    /// of the radius; thinner cuts may go faster, at most twice as fast. Cuts deeper than [`Operation::DEEP`] working
-    /// diameters go at half the feed.
-    pub fn feed_limit_mm_per_min(&self, thickness_mm: f64) -> f64 {
-        let radius_mm = 0.5 * self.cutter.working_mm();
-        if thickness_mm > 2.0 * radius_mm * Self::DEEP {
+    /// A cut that takes little on one side, or with the part of a round end near its tip, makes chips thinner than the feed
+    /// of a tooth (radial and axial chip thinning). `feed_mm_per_min` is for a slot, with a round end one as deep as a
+    /// third of its radius; thinner chips may go faster, at most twice as fast. Cuts deeper than [`Operation::DEEP`] working
+    /// diameters go at half the feed. Forms that are neither flat nor round at the end gain nothing.
+    pub fn feed_limit_mm_per_min(&self, thickness_mm: f64, chip: f64) -> f64 {
+        if thickness_mm > self.cutter.working_mm() * Self::DEEP {
             return 0.5 * self.feed_mm_per_min;
         }
-        if self.cutter.ball_mm().is_none() {
-            return self.feed_mm_per_min;
-        }
-        let sine = |share: f64| (share * (2.0 - share)).max(0.0).sqrt();
-        let share = (thickness_mm / radius_mm).clamp(0.0, 1.0 / 3.0);
-        let gain = (sine(1.0 / 3.0) / sine(share)).min(2.0);
-        gain * self.feed_mm_per_min
+        let usual = match self.cutter.shape {
+            CutterShape::Flat => 1.0,
+            // sin k with cos k = 1 - 1/3
+            CutterShape::Ball | CutterShape::Tapered { .. } => (5.0_f64 / 9.0).sqrt(),
+            _ => return self.feed_mm_per_min,
+        };
+        (usual / chip).clamp(1.0, 2.0) * self.feed_mm_per_min
     }
 
     /// Cuts deeper than this many working diameters at once go slower.

@@ -345,18 +345,20 @@ impl Case<'_> {
     /// True when the move's feed is higher than it may be in wood of any thickness.
     fn races(&self, m: &Move) -> bool {
         let MoveKind::Feed { feed_mm_per_min } = m.kind else { return false };
-        feed_mm_per_min > self.feed_limit_mm_per_min(0.0) * SPEED_SLACK
+        feed_mm_per_min > self.feed_limit_mm_per_min(Contact::default()) * SPEED_SLACK
     }
 
     /// True when the move's feed is higher than it may be in the wood that it met.
     fn is_too_fast(&self, m: &Move, c: Contact) -> bool {
         let MoveKind::Feed { feed_mm_per_min } = m.kind else { return false };
-        feed_mm_per_min > self.feed_limit_mm_per_min(f64::from(c.deepest_mm)) * SPEED_SLACK
+        feed_mm_per_min > self.feed_limit_mm_per_min(c) * SPEED_SLACK
     }
 
-    /// Highest feed in a cut of this thickness, mm/min. Deep cuts are planned slower, but that is no law.
-    fn feed_limit_mm_per_min(&self, thickness_mm: f64) -> f64 {
-        let limit = |o: &&Operation| o.feed_limit_mm_per_min(thickness_mm).max(o.feed_mm_per_min);
+    /// Highest feed in a cut like this, mm/min. Deep cuts are planned slower, but that is no law.
+    fn feed_limit_mm_per_min(&self, c: Contact) -> f64 {
+        let (thickness_mm, chip) = (f64::from(c.deepest_mm), f64::from(c.chip));
+        let limit =
+            |o: &&Operation| o.feed_limit_mm_per_min(thickness_mm, chip).max(o.feed_mm_per_min);
         self.operations.iter().map(limit).fold(0.0, f64::max)
     }
 

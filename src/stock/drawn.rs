@@ -80,6 +80,18 @@ impl<'a> Drawn<'a> {
         [ends.hull(strip.meet(within(self.u.y * dy, self.u.x, 0.0, self.len)))]
     }
 
+    /// The forward part of the normal of the cutter's surface at `height_mm` above the tip, `beside_mm` off its way.
+    pub(super) fn chip(&self, height_mm: f64, beside_mm: f64) -> f64 {
+        let rim = self.form.radius_mm();
+        let reach = self.form.radius_at(height_mm).min(rim);
+        if self.len == 0.0 || reach <= beside_mm.abs() {
+            return 0.0;
+        }
+        let slope = if reach < rim { self.form.height_and_slope(reach).1 } else { f64::INFINITY };
+        let steep = if slope.is_finite() { slope / (1.0 + slope * slope).sqrt() } else { 1.0 };
+        steep * (reach * reach - beside_mm * beside_mm).sqrt() / reach
+    }
+
     /// What it leaves at the node `d` from the anchor; `None` where it does not come, or the move before it came as low.
     #[inline]
     pub(super) fn left(&self, d: DVec2) -> Option<Left> {
@@ -88,7 +100,8 @@ impl<'a> Drawn<'a> {
         if self.len == 0.0 {
             let off = d.length();
             let z = self.low.z;
-            return (off <= r).then(|| Left { z: z + self.form.height(off), tip: z });
+            let up = || self.form.height(off);
+            return (off <= r).then(|| Left { z: z + up(), tip: z, beside: 0.0 });
         }
         if q.abs() > r {
             return None;
@@ -107,6 +120,6 @@ impl<'a> Drawn<'a> {
             return None;
         }
         let tip = self.low.z + self.m * at;
-        Some(Left { z: tip + self.form.height(off2.sqrt()), tip })
+        Some(Left { z: tip + self.form.height(off2.sqrt()), tip, beside: q })
     }
 }

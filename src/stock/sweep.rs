@@ -166,6 +166,8 @@ pub(super) struct Left {
     pub(super) z: f64,
     /// Height of the tip when it cuts the node, mm.
     pub(super) tip: f64,
+    /// Distance of the node from the tip's way in plan, mm, on one side below zero.
+    pub(super) beside: f64,
 }
 
 /// Something that removes wood row by row.
@@ -307,6 +309,21 @@ impl Sweep<'_> {
         Some(Self::Stamp(Stamp { at: a.to, tip, wedge }))
     }
 
+    /// The forward part of the normal of the cutter's surface at `height_mm` above the tip, `beside_mm` off its way; 0 where
+    /// the cutter stands (its neighbours in a chain tell).
+    pub(super) fn chip(&self, height_mm: f64, beside_mm: f64) -> f64 {
+        let ahead = |reach_mm: f64| (reach_mm * reach_mm - beside_mm * beside_mm).max(0.0).sqrt();
+        match self {
+            Self::Stamp(_) => 0.0,
+            Self::Along(a) if a.tip.flat => ahead(a.tip.radius) / a.tip.radius,
+            Self::Along(a) => {
+                let h = height_mm.clamp(0.0, a.tip.radius);
+                ahead((h * (2.0 * a.tip.radius - h)).sqrt()) / a.tip.radius
+            }
+            Self::Turned(t) => t.chip(height_mm, beside_mm),
+        }
+    }
+
     /// Lowest and highest y it can touch.
     pub(super) fn y_range(&self) -> (f64, f64) {
         match self {
@@ -358,7 +375,7 @@ impl Stamp {
             return None;
         }
         let up = if self.tip.flat { 0.0 } else { self.tip.radius - h2.sqrt() };
-        Some(Left { z: self.at.z + up, tip: self.at.z })
+        Some(Left { z: self.at.z + up, tip: self.at.z, beside: 0.0 })
     }
 }
 
@@ -425,13 +442,14 @@ impl Along {
         } else {
             let tip = self.low.z + self.m * best;
             let z = if self.tip.flat { tip } else { self.low.z + self.m * s + r - w * self.root };
-            return Some(Left { z, tip });
+            return Some(Left { z, tip, beside: q });
         };
         let h2 = w2 - (s - at) * (s - at);
         if h2 < 0.0 {
             return None;
         }
         let tip = self.low.z + self.m * at;
-        Some(Left { z: if self.tip.flat { tip } else { tip + r - h2.sqrt() }, tip })
+        let z = if self.tip.flat { tip } else { tip + r - h2.sqrt() };
+        Some(Left { z, tip, beside: q })
     }
 }

@@ -1,7 +1,7 @@
 use super::*;
-use crate::cutter::tests::convex_forms;
+use crate::cutter::tests::{convex_forms, spec};
 use crate::geom::{DVec3, MoveKind};
-use crate::job::{Origin, Wood};
+use crate::job::{CutterShape, Origin, Wood};
 use proptest::prelude::*;
 
 fn stock() -> Stock {
@@ -308,13 +308,39 @@ fn contacts_say_what_each_move_met() {
     let mut b = block(0.1);
     let moves = chain(&[[2.0, 5.0, 5.0], [2.0, 5.0, -2.0], [9.0, 5.0, -2.0], [9.0, 5.0, 5.0]]);
     let c = b.cut(&FLAT, &moves);
-    assert_eq!(c[0], Contact { deepest_mm: 2.0, engaged_mm: 2.0 });
-    assert_eq!(c[1], Contact { deepest_mm: 2.0, engaged_mm: 2.0 });
+    let met = |chip| Contact { deepest_mm: 2.0, engaged_mm: 2.0, chip };
+    assert_eq!(c[0], met(0.0));
+    assert_eq!(c[1], met(1.0), "a slot: the front cuts straight ahead");
     assert_eq!(c[2], Contact::default(), "the retract runs in what is cut already");
     let through = Move { kind: MoveKind::Rapid, ..mv([6.0, 0.0, -0.5], [6.0, 10.0, -0.5]) };
     assert_eq!(b.cut(&FLAT, &[through])[0].deepest_mm, 0.5);
     let above = mv([0.0, 0.0, 0.0], [12.0, 10.0, 0.0]);
     assert_eq!(b.cut(&BALL, &[above])[0], Contact::default());
+}
+
+/// Beside its last pass, s away, an end of radius r at the top of the wood meets it first where r - s is off its way:
+/// the forward part of a flat end's normal is then sqrt(s (2 r - s)) / r there, that of a ball r / R of it.
+#[test]
+fn chips_are_thin_beside_the_last_pass_and_near_the_tip_of_a_ball() {
+    let depth = 0.4;
+    let level = |y: f64| mv([-3.0, y, -depth], [15.0, y, -depth]);
+    let cone = Profile::of(&spec(CutterShape::V { angle_rad: 1.2, tip_mm: 0.0 }, 4.0));
+    let steep = libm::cos(0.6);
+    let ball = (0.4_f64 * (3.0 - 0.4)).sqrt();
+    let cases = [(FLAT, 1.6, 1.0), (BALL, ball, ball / 1.5), (cone.clone(), 0.0, steep)];
+    for (profile, r, steep) in cases {
+        for s in [0.1, 0.2, 0.25] {
+            let mut b = block(0.02);
+            let slot = b.cut(&profile, &[level(4.0)])[0].chip;
+            assert!((f64::from(slot) - steep).abs() < 2e-3, "{profile:?} slot {slot}");
+            let beside = b.cut(&profile, &[level(4.0 + s)])[0].chip;
+            // A cone is as wide as the step s somewhere, and meets it there with its whole front.
+            let is_cone = profile == cone;
+            let thick = if is_cone { steep } else { steep * (s * (2.0 * r - s)).sqrt() / r };
+            // Nodes lie up to a pitch off, the last of them stand a little lower than the top.
+            assert!((f64::from(beside) - thick).abs() < 0.06, "{profile:?} {s}: {beside}, {thick}");
+        }
+    }
 }
 
 #[test]

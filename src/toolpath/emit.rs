@@ -98,14 +98,16 @@ impl<'a> Emitter<'a> {
     /// ahead and back: where it is little the cutter goes faster, where it is deep slower.
     pub(super) fn settle_feeds(&mut self, first: usize, contacts: &[Contact]) {
         let moves = &self.moves[first..];
-        let thickest = thickest_nearby(moves, contacts);
+        let thickest = most_nearby(moves, |k| f64::from(contacts[k].deepest_mm));
+        let chips = most_nearby(moves, |k| f64::from(contacts[k].chip));
         let base = self.operation.feed_mm_per_min;
-        let speeds = moves.iter().zip(&thickest).map(|(m, &thickness_mm)| {
-            let gain = self.operation.feed_limit_mm_per_min(thickness_mm) / base;
-            // Few different speeds: in quarters.
-            let most = base * ((gain * 4.0 + 1e-9).floor() / 4.0).max(0.25);
-            feed(m.to - m.from, most, self.operation, &self.job.machine)
-        });
+        let speeds =
+            moves.iter().zip(thickest.iter().zip(&chips)).map(|(m, (&thickness_mm, &chip))| {
+                let gain = self.operation.feed_limit_mm_per_min(thickness_mm, chip) / base;
+                // Few different speeds: in eighths.
+                let most = base * ((gain * 8.0 + 1e-9).floor() / 8.0).max(0.25);
+                feed(m.to - m.from, most, self.operation, &self.job.machine)
+            });
         let speeds: Vec<f64> = speeds.collect();
         for (m, feed_mm_per_min) in self.moves[first..].iter_mut().zip(speeds) {
             if !m.is_rapid() {
@@ -130,9 +132,8 @@ impl<'a> Emitter<'a> {
     }
 }
 
-/// The largest thickness of wood taken by each move or by moves within [`NEARBY_MM`] of way before and after it.
-fn thickest_nearby(moves: &[Move], contacts: &[Contact]) -> Vec<f64> {
-    let thickness = |k: usize| f64::from(contacts[k].deepest_mm);
+/// The largest of a figure (by index) for each move and the moves within [`NEARBY_MM`] of way before and after it.
+fn most_nearby(moves: &[Move], figure: impl Fn(usize) -> f64) -> Vec<f64> {
     // Greatest of a sliding window over the way (its ends by where moves begin and end).
     let mut along = vec![0.0];
     along.extend(moves.iter().scan(0.0, |s, m| {
@@ -144,7 +145,7 @@ fn thickest_nearby(moves: &[Move], contacts: &[Contact]) -> Vec<f64> {
     (0..moves.len())
         .map(|k| {
             while next < moves.len() && along[next] <= along[k + 1] + NEARBY_MM {
-                while window.back().is_some_and(|&j| thickness(j) <= thickness(next)) {
+                while window.back().is_some_and(|&j| figure(j) <= figure(next)) {
                     window.pop_back();
                 }
                 window.push_back(next);
@@ -153,7 +154,7 @@ fn thickest_nearby(moves: &[Move], contacts: &[Contact]) -> Vec<f64> {
             while window.front().is_some_and(|&j| along[j + 1] < along[k] - NEARBY_MM) {
                 window.pop_front();
             }
-            window.front().map_or(0.0, |&j| thickness(j))
+            window.front().map_or(0.0, |&j| figure(j))
         })
         .collect()
 }

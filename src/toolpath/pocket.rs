@@ -98,7 +98,7 @@ pub(super) fn pockets(
     let disc = Profile::Flat { radius_mm: profile.radius_mm() };
     let cells = Cells::new(&allowed);
     let depths = levels(&allowed, cut.stepdown_mm, FILM_MM);
-    for (k, &z) in depths.iter().enumerate() {
+    for &z in &depths {
         let wood = tip_field(block.field(), &disc);
         let level = Level {
             z,
@@ -118,9 +118,8 @@ pub(super) fn pockets(
             let wood_mm = block.highest_under(profile.radius_mm(), chain[0].truncate());
             out.chain(&chain, wood_mm, &travel);
         }
-        if k + 1 < depths.len() || site.later {
-            block.cut(&profile, &out.moves()[before..]);
-        }
+        let contacts = block.cut(&profile, &out.moves()[before..]);
+        out.settle_feeds(before, &contacts);
     }
     Ok(())
 }

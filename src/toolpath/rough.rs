@@ -127,9 +127,8 @@ pub(super) fn rough(
             let wood = block.highest_under(profile.radius_mm(), chain[0].truncate());
             out.chain(&chain, wood, &travel);
         }
-        if k < levels || site.later || cut.only_deeper_than_mm > 0.0 {
-            block.cut(&profile, &out.moves()[before..]);
-        }
+        let contacts = block.cut(&profile, &out.moves()[before..]);
+        out.settle_feeds(before, &contacts);
     }
     Ok(())
 }

@@ -717,3 +717,28 @@ fn a_finish_goes_into_the_corner_of_the_stock() {
         wall: true,
     }]);
 }
+
+/// The chip of a slot R/3 deep is sin k with cos k = 2/3; a flat one's is the whole feed of a tooth.
+#[test]
+fn feeds_rise_as_chips_get_thinner() {
+    let ball = raster(fixture::cutter(CutterShape::Ball, 3.0), Stepover::Plan(0.3), 0.0);
+    let base = ball.feed_mm_per_min;
+    let usual = libm::sin(libm::acos(2.0 / 3.0));
+    for (thickness_mm, chip, gain) in [
+        (0.5, usual, 1.0),
+        (1.5, 1.0, 1.0),
+        (0.5, usual / 1.5, 1.5),
+        (0.1, 0.01, 2.0),
+        (0.0, 0.0, 2.0),
+        (4.6, 0.1, 0.5),
+    ] {
+        let feed = ball.feed_limit_mm_per_min(thickness_mm, chip);
+        assert!((feed - gain * base).abs() < 1e-9 * base, "{thickness_mm} {chip}: {feed}");
+    }
+    let flat = rough(fixture::cutter(CutterShape::Flat, 6.0), 0.5, 1.5);
+    assert_eq!(flat.feed_limit_mm_per_min(1.5, 1.0), flat.feed_mm_per_min);
+    assert_eq!(flat.feed_limit_mm_per_min(1.5, 0.8), 1.25 * flat.feed_mm_per_min);
+    let v = CutterShape::V { angle_rad: 1.0, tip_mm: 0.0 };
+    let v = rough(fixture::cutter(v, 6.0), 0.5, 1.5);
+    assert_eq!(v.feed_limit_mm_per_min(0.1, 0.1), v.feed_mm_per_min);
+}
