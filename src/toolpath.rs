@@ -14,6 +14,8 @@ mod contours;
 mod emit;
 mod finish;
 mod fit;
+mod inward;
+mod lead;
 mod left;
 mod levels;
 mod order;
@@ -34,10 +36,11 @@ mod tests;
 pub use check::PathFault;
 
 use crate::geom::{Heightfield, Move, MoveKind};
-use crate::job::{CutterSpec, Job, Operation, OperationKind, Pattern};
+use crate::job::{CutterSpec, Follow, Job, Operation, OperationKind, Pattern};
 use crate::relief::Grounds;
 use crate::stock::Block;
 use emit::Emitter;
+use finish::Finish;
 use pocket::Pockets;
 use rough::Rough;
 use waterline::Contour;
@@ -263,8 +266,13 @@ fn plan_from(
                 let cut = Contour { scallop_mm, steeper_than_rad, milling };
                 waterline::contour(&site, &cut, block, &mut out)?;
             }
-            OperationKind::Finish { scallop_mm, angle_rad } => {
-                finish::finish(&site, scallop_mm, angle_rad, block, &mut out)?;
+            OperationKind::Finish { scallop_mm, follow, angle_rad } => {
+                let outlines = match follow {
+                    Follow::Direction => None,
+                    Follow::Outlines => Some(grounds.outline_distance()),
+                };
+                let cut = Finish { scallop_mm, angle_rad, outlines: outlines.as_ref() };
+                finish::finish(&site, &cut, block, &mut out)?;
             }
         }
         for note in notes(&site, &out) {

@@ -157,6 +157,9 @@ pub(super) const PATTERNS: &[&str] = &["contour", "raster"];
 /// Names of [`super::Milling`], in its order.
 pub(super) const MILLINGS: &[&str] = &["climb", "conventional"];
 
+/// Names of [`super::Follow`], in its order.
+pub(super) const FOLLOWS: &[&str] = &["direction", "outlines"];
+
 const LENGTH: f64 = 10_000.0;
 
 /// Shorthand for a number of millimetres.
@@ -626,6 +629,12 @@ pub(super) static OPERATION: Section = Section {
             Kind::Choice(PATTERNS),
             Text("contour"),
             "rough: rings that keep their distance from the walls (contour), or parallel passes (raster)",
+        ),
+        key(
+            "follow",
+            Kind::Choice(FOLLOWS),
+            Text("direction"),
+            "finish: what the first passes follow: one direction (angle_deg), or the outlines of the artwork",
         ),
         key(
             "milling",

@@ -11,8 +11,8 @@ use super::reader::Table;
 use super::settle::round;
 use super::speeds::{self, Speeds, Wanted};
 use super::types::{
-    CutterShape, CutterSpec, LayerSpec, Milling, Operation, OperationKind, Pattern, Stepover,
-    Stock, Within,
+    CutterShape, CutterSpec, Follow, LayerSpec, Milling, Operation, OperationKind, Pattern,
+    Stepover, Stock, Within,
 };
 
 /// An operation whose numbers may still be open.
@@ -27,6 +27,7 @@ pub(super) struct OperationDraft {
     pub(super) angle_rad: Option<f64>,
     /// Index of a word of [`PATTERNS`].
     pub(super) pattern: usize,
+    pub(super) follow: Follow,
     pub(super) milling: Milling,
     pub(super) steeper_than_rad: f64,
     pub(super) within: WithinDraft,
@@ -82,14 +83,18 @@ pub(super) fn read_operation(
     };
     let foreign: &[&str] = match kind {
         KindDraft::Rough if table.choice("pattern") == 0 => {
-            &["scallop_mm", "steeper_than_deg", "angle_deg"]
+            &["scallop_mm", "steeper_than_deg", "follow", "angle_deg"]
         }
-        KindDraft::Rough => &["scallop_mm", "steeper_than_deg", "milling"],
+        KindDraft::Rough => &["scallop_mm", "steeper_than_deg", "follow", "milling"],
         KindDraft::Finish => {
             &["leave_mm", "stepdown_mm", "stepover_mm", "pattern", "milling", "steeper_than_deg"]
         }
-        KindDraft::Raster => &["leave_mm", "stepdown_mm", "pattern", "milling", "steeper_than_deg"],
-        KindDraft::Contour => &["leave_mm", "stepdown_mm", "stepover_mm", "pattern", "angle_deg"],
+        KindDraft::Raster => {
+            &["leave_mm", "stepdown_mm", "pattern", "follow", "milling", "steeper_than_deg"]
+        }
+        KindDraft::Contour => {
+            &["leave_mm", "stepdown_mm", "stepover_mm", "pattern", "follow", "angle_deg"]
+        }
     };
     if let Some(name) = foreign.iter().find(|name| table.raw(name).is_some()) {
         let whose = match kind {
@@ -148,6 +153,7 @@ fn operation(
         stepover_mm: table.number("stepover_mm"),
         scallop_mm: table.number("scallop_mm"),
         pattern: table.choice("pattern"),
+        follow: [Follow::Direction, Follow::Outlines][table.choice("follow")],
         milling: [Milling::Climb, Milling::Conventional][table.choice("milling")],
         steeper_than_rad: table.sure_number("steeper_than_deg").to_radians(),
         within: read_within(table)?,
@@ -373,9 +379,11 @@ impl Step<'_> {
                 steeper_than_rad: draft.steeper_than_rad,
                 milling: draft.milling,
             },
-            KindDraft::Finish => {
-                OperationKind::Finish { scallop_mm: self.scallop_mm()?, angle_rad }
-            }
+            KindDraft::Finish => OperationKind::Finish {
+                scallop_mm: self.scallop_mm()?,
+                follow: draft.follow,
+                angle_rad,
+            },
             KindDraft::Raster => OperationKind::Raster { stepover: self.stepover()?, angle_rad },
         })
     }

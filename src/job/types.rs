@@ -578,7 +578,9 @@ pub enum OperationKind {
     Finish {
         /// Height of the cusps, mm.
         scallop_mm: f64,
-        /// Direction of the first passes from the x axis, radians.
+        /// What the first passes follow.
+        follow: Follow,
+        /// Direction of parallel passes from the x axis, radians.
         angle_rad: f64,
     },
     /// Parallel passes over the whole target.
@@ -604,6 +606,16 @@ pub enum Pattern {
         /// Direction of the passes from the x axis, radians.
         angle_rad: f64,
     },
+}
+
+/// What the first passes of finishing follow.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Follow {
+    /// One direction: parallel passes, to and fro.
+    Direction,
+    /// The outlines of the artwork: passes at even distances from them (contour-parallel).
+    Outlines,
 }
 
 /// On which side of its way the cutter, which turns clockwise, meets the wood.

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use super::draft::Draft;
 use super::error::JobError;
 use super::keys::{
-    ARTWORK, BACKGROUND, COMBINES, CUTTER, Fallback, JOB, JOINS, LAYER, MACHINE, MILLINGS,
+    ARTWORK, BACKGROUND, COMBINES, CUTTER, FOLLOWS, Fallback, JOB, JOINS, LAYER, MACHINE, MILLINGS,
     OPERATION, ORIGINS, PATTERNS, PROFILES, PRUNES, RELIEF, SAFETY, SPLITS, STOCK, SURFACE,
     Section, TOLERANCE, TOP, WOOD, rule,
 };
@@ -379,8 +379,9 @@ fn operation_lines(operation: &Operation) -> Vec<Line> {
             });
             ("rough", lines)
         }
-        OperationKind::Finish { scallop_mm, angle_rad } => {
-            ("finish", vec![("scallop_mm", number(scallop_mm)), angle(angle_rad)])
+        OperationKind::Finish { scallop_mm, follow, angle_rad } => {
+            let follow = ("follow", quoted(FOLLOWS[follow as usize]));
+            ("finish", vec![("scallop_mm", number(scallop_mm)), follow, angle(angle_rad)])
         }
         OperationKind::Raster { stepover, angle_rad } => {
             let line = match stepover {

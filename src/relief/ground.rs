@@ -10,6 +10,7 @@
 use crate::geom::{DVec2, Grid, Heightfield, distance_field};
 use crate::job::{Job, Operation, Within};
 use crate::outline::{Outlines, Region};
+use crate::surface::{Segments, Window};
 
 /// The ground of every operation of a job, over the whole stock.
 #[derive(Debug, Clone)]
@@ -17,12 +18,13 @@ pub struct Grounds<'a> {
     target: &'a Heightfield,
     /// By operation; `None` = the target itself.
     own: Vec<Option<Heightfield>>,
+    outlines: Segments,
 }
 
 impl<'a> From<&'a Heightfield> for Grounds<'a> {
-    /// Every operation may go down to the target everywhere.
+    /// Every operation may go down to the target everywhere; there are no outlines.
     fn from(target: &'a Heightfield) -> Self {
-        Self { target, own: Vec::new() }
+        Self { target, own: Vec::new(), outlines: Segments::default() }
     }
 }
 
@@ -42,7 +44,29 @@ impl<'a> Grounds<'a> {
             keep_out(job, &mut ground);
             Some(ground)
         };
-        Self { target, own: job.operations.iter().map(own).collect() }
+        let figures = outlines.layers.iter().flat_map(|layer| &layer.figures);
+        let rings = figures.flat_map(|figure| &figure.regions).flat_map(Region::rings);
+        Self {
+            target,
+            own: job.operations.iter().map(own).collect(),
+            outlines: Segments::of_rings(rings),
+        }
+    }
+
+    /// These outlines for passes to follow, instead of those that it has.
+    #[must_use]
+    pub fn with_outlines(self, outlines: Segments) -> Self {
+        Self { outlines, ..self }
+    }
+
+    /// Distance of every node of the target from the nearest outline of any layer, mm; infinite without outlines.
+    pub fn outline_distance(&self) -> Heightfield {
+        let grid = *self.target.grid();
+        let mut distance = Heightfield::flat(grid, 0.0);
+        let window = Window { i0: 0, j0: 0, nx: grid.nx, ny: grid.ny };
+        let out = distance.z_mut();
+        self.outlines.fill(&grid, &window, f64::INFINITY, out, |_| true, |d| d as f32);
+        distance
     }
 
     /// The target.

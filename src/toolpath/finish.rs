@@ -9,12 +9,12 @@
 
 use super::emit::Emitter;
 use super::left::Surfaces;
-use super::raster::{Passes, clear_deep_wood, passes, passes_where_wood_is_left};
+use super::raster::{First, Passes, clear_deep_wood, passes, passes_where_wood_is_left};
 use super::trace::LEAST_ROUNDING_MM;
 use super::waterline::{Waterlines, waterlines};
 use super::{Site, ToolpathError};
 use crate::cutter::Profile;
-use crate::geom::DVec2;
+use crate::geom::{DVec2, Heightfield};
 use crate::offset::{closing, tip_field};
 use crate::stock::Block;
 use std::f64::consts::{FRAC_1_SQRT_2, FRAC_PI_2, FRAC_PI_4};
@@ -32,20 +32,29 @@ const TURNS: [(f64, f64); 6] = [
 /// Part of `gouge_mm` that may be left above the scallop height before more passes are worth it.
 const SPARE: f64 = 0.75;
 
+/// The numbers of finishing.
+pub(super) struct Finish<'a> {
+    pub(super) scallop_mm: f64,
+    /// Direction of parallel passes from the x axis, radians.
+    pub(super) angle_rad: f64,
+    /// Distance from the outlines that the first passes follow, mm; `None`: they are parallel.
+    pub(super) outlines: Option<&'a Heightfield>,
+}
+
 /// Plans the passes; the moves go to `out`.
 pub(super) fn finish(
     site: &Site,
-    scallop_mm: f64,
-    angle_rad: f64,
+    cut: &Finish,
     block: &mut Block,
     out: &mut Emitter,
 ) -> Result<(), ToolpathError> {
+    let Finish { scallop_mm, angle_rad, outlines } = *cut;
     let profile = Profile::of(&site.operation.cutter);
     let stepover_mm = site.stepover_of(scallop_mm)?;
     clear_deep_wood(site, angle_rad, block, out)?;
     let limit_mm = scallop_mm + SPARE * site.job.tolerance.gouge_mm;
-    let Some(done) = passes_where_wood_is_left(site, stepover_mm, angle_rad, limit_mm, block, out)?
-    else {
+    let first = First { stepover_mm, angle_rad, outlines };
+    let Some(done) = passes_where_wood_is_left(site, &first, limit_mm, block, out)? else {
         return Ok(());
     };
     out.note_deep_pass(done.deepest_mm);

@@ -2,10 +2,11 @@
 
 use crate::geom::{DVec2, DVec3, Grid, Heightfield, Tolerance};
 use crate::job::{
-    ArtworkSpec, Background, Combine, CutterShape, CutterSpec, Fit, Job, LayerSpec, Machine,
-    Milling, Operation, OperationKind, Origin, Pattern, Place, Profile, ReliefSpec, Selector,
-    Stepover, Stock, SurfaceSpec, Within, Wood,
+    ArtworkSpec, Background, Combine, CutterShape, CutterSpec, Fit, Follow, Job, LayerSpec,
+    Machine, Milling, Operation, OperationKind, Origin, Pattern, Place, Profile, ReliefSpec,
+    Selector, Stepover, Stock, SurfaceSpec, Within, Wood,
 };
+use proptest::prelude::{Strategy, any, prop};
 
 /// A job on a stock of this size with these operations and a shapeoko-like machine.
 pub(crate) fn job(
@@ -124,7 +125,7 @@ pub(crate) fn raster(cutter: CutterSpec, stepover: Stepover, angle_deg: f64) -> 
 
 /// A finishing operation with first passes along x.
 pub(crate) fn finish(cutter: CutterSpec, scallop_mm: f64) -> Operation {
-    let kind = OperationKind::Finish { scallop_mm, angle_rad: 0.0 };
+    let kind = OperationKind::Finish { scallop_mm, follow: Follow::Direction, angle_rad: 0.0 };
     Operation { kind, ..raster(cutter, Stepover::Plan(1.0), 0.0) }
 }
 
@@ -161,4 +162,17 @@ pub(crate) fn relief(job: &Job, depth_mm: f64, frame_mm: f64, bumps: &[Bump]) ->
         };
         (bumps.iter().map(rise).fold(0.0, f64::max) - depth_mm).min(0.0)
     })
+}
+
+/// A few bumps anywhere on a stock of this size, up to `depth` high, mm.
+pub(crate) fn bumps(size: DVec2, depth: f64) -> impl Strategy<Value = Vec<Bump>> {
+    let bump = (0.0..=1.0, 0.0..=1.0, 0.4..4.0f64, 0.2..1.0f64, any::<bool>()).prop_map(
+        move |(u, v, radius_mm, h, wall)| Bump {
+            at: size * DVec2::new(u, v),
+            radius_mm,
+            height_mm: h * depth,
+            wall,
+        },
+    );
+    prop::collection::vec(bump, 1..5)
 }

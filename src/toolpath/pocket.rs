@@ -296,7 +296,7 @@ fn nest(rings: &mut [Ring]) {
 }
 
 /// Squared distance of the vertex nearest to a point, and which it is.
-fn nearest_vertex(path: &[DVec2], p: DVec2) -> (f64, usize) {
+pub(super) fn nearest_vertex(path: &[DVec2], p: DVec2) -> (f64, usize) {
     let all = path.iter().enumerate().map(|(k, v)| (v.distance_squared(p), k));
     all.min_by(|a, b| a.0.total_cmp(&b.0)).expect("a ring has points")
 }
@@ -316,12 +316,12 @@ fn next(left: &[Option<Ring>], at: Option<DVec2>) -> Option<(usize, usize)> {
     ready.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, k, start)| (k, start))
 }
 
-fn is_closed(path: &[DVec2]) -> bool {
+pub(super) fn is_closed<P: PartialEq>(path: &[P]) -> bool {
     path.first() == path.last()
 }
 
 /// A closed path begun at another of its vertices.
-fn begun_at(mut path: Vec<DVec2>, start: usize) -> Vec<DVec2> {
+pub(super) fn begun_at<P: PartialEq + Copy>(mut path: Vec<P>, start: usize) -> Vec<P> {
     if start > 0 && is_closed(&path) {
         path.pop();
         path.rotate_left(start);

@@ -9,6 +9,7 @@
 use super::chain::{Span, chains};
 use super::emit::{Emitter, feed_seconds};
 use super::fit::fit;
+use super::inward::{Inward, inward};
 use super::left::{Todo, todo};
 use super::order::{Direction, in_order};
 use super::rough::{Rough, rough};
@@ -17,7 +18,7 @@ use super::trace::{LEAST_ROUNDING_MM, Sample, Tracer};
 use super::travel::Travel;
 use super::{Site, ToolpathError};
 use crate::cutter::Profile;
-use crate::geom::{DVec2, DVec3};
+use crate::geom::{DVec2, DVec3, Heightfield};
 use crate::job::{CutterSpec, Stepover};
 use crate::offset::Dropper;
 use crate::stock::Block;
@@ -71,7 +72,8 @@ pub(super) fn raster(
     };
     clear_deep_wood(site, angle_rad, block, out)?;
     let limit_mm = site.job.tolerance.scallop_mm + site.job.tolerance.gouge_mm;
-    let done = passes_where_wood_is_left(site, stepover_mm, angle_rad, limit_mm, block, out)?;
+    let first = First { stepover_mm, angle_rad, outlines: None };
+    let done = passes_where_wood_is_left(site, &first, limit_mm, block, out)?;
     if let Some(done) = done {
         out.note_deep_pass(done.deepest_mm);
         let contacts = block.cut(&profile, &out.moves()[done.first..]);
@@ -80,27 +82,41 @@ pub(super) fn raster(
     Ok(())
 }
 
+/// The passes with which finishing begins.
+pub(super) struct First<'a> {
+    /// Their distance, mm.
+    pub(super) stepover_mm: f64,
+    /// Direction of parallel passes from the x axis, radians.
+    pub(super) angle_rad: f64,
+    /// Distance from the outlines that they follow instead, mm.
+    pub(super) outlines: Option<&'a Heightfield>,
+}
+
 /// Passes over everything or, after earlier finishing, where that has left more than `limit_mm` within reach; `None` when
 /// it has left nothing.
 pub(super) fn passes_where_wood_is_left(
     site: &Site,
-    stepover_mm: f64,
-    angle_rad: f64,
+    cut: &First,
     limit_mm: f64,
     block: &Block,
     out: &mut Emitter,
 ) -> Result<Option<Passed>, ToolpathError> {
-    match todo(site, limit_mm, stepover_mm, block.field()) {
-        Todo::Nothing => Ok(None),
-        Todo::All => {
-            passes(site, &Passes { stepover_mm, angle_rad, only: None }, block, out).map(Some)
-        }
-        Todo::Here(left) => {
-            let only = |p: DVec2| left.cap_mm(p);
-            let cut = Passes { stepover_mm, angle_rad, only: Some(&only) };
-            passes(site, &cut, block, out).map(Some)
-        }
+    let First { stepover_mm, angle_rad, outlines } = *cut;
+    let todo = todo(site, limit_mm, stepover_mm, block.field());
+    let cap = |p: DVec2| match &todo {
+        Todo::Here(left) => left.cap_mm(p),
+        _ => f64::INFINITY,
+    };
+    let only: Option<&(dyn Fn(DVec2) -> f64 + Sync)> = match &todo {
+        Todo::Nothing => return Ok(None),
+        Todo::All => None,
+        Todo::Here(_) => Some(&cap),
+    };
+    match outlines {
+        Some(distance) => inward(site, &Inward { distance, stepover_mm, only }, block, out),
+        None => passes(site, &Passes { stepover_mm, angle_rad, only }, block, out),
     }
+    .map(Some)
 }
 
 /// One set of parallel passes.
@@ -289,7 +305,7 @@ pub(super) fn clear_deep_wood(
 }
 
 /// The deepest wood on the axis of the cutter along the passes, where it is deeper than one pass should take; else 0.
-fn deepest_pass_mm(spans: &[Vec<Span>], block: &Block, diameter_mm: f64) -> f64 {
+pub(super) fn deepest_pass_mm(spans: &[Vec<Span>], block: &Block, diameter_mm: f64) -> f64 {
     let depth = |p: &DVec3| block.field().height_at(p.truncate()).map_or(0.0, |top| top - p.z);
     let deepest = spans.iter().flatten().flatten().map(depth).fold(0.0, f64::max);
     // The levels leave steps: half a diameter more is no cause for alarm.
@@ -339,7 +355,7 @@ fn crosses(site: &Site, travel: &Travel, row: &Row, a: &Sample, b: &Sample) -> b
 }
 
 /// Samples of a row as points in space.
-fn points(row: &Row, path: &[Sample]) -> Vec<DVec3> {
+pub(super) fn points(row: &Row, path: &[Sample]) -> Vec<DVec3> {
     let along = (row.to - row.from).normalize_or_zero();
     path.iter().map(|p| (row.from + along * p.s).extend(p.z)).collect()
 }

@@ -1,7 +1,7 @@
 //! Laws of whole plans, held against brute force that shares no code with the planner.
 
 use super::fit::fit;
-use super::fixture::{Bump, contour, cutter, finish, job, raster, relief, rough};
+use super::fixture::{Bump, bumps, contour, cutter, finish, job, raster, relief, rough};
 use super::trace::{Sample, Tracer};
 use super::*;
 use crate::cutter::Profile;
@@ -138,16 +138,30 @@ fn assert_no_gouge(paths: &[Toolpath], target: &Heightfield) {
     }
 }
 
-fn bumps(size: DVec2, depth: f64) -> impl Strategy<Value = Vec<Bump>> {
-    let bump = (0.0..=1.0, 0.0..=1.0, 0.4..4.0f64, 0.2..1.0f64, any::<bool>()).prop_map(
-        move |(u, v, radius_mm, h, wall)| Bump {
-            at: size * DVec2::new(u, v),
-            radius_mm,
-            height_mm: h * depth,
-            wall,
-        },
-    );
-    prop::collection::vec(bump, 1..5)
+/// Every form of cutter, by diameter, mm.
+const FORMS: [fn(f64) -> CutterShape; 6] = [
+    |_| CutterShape::Flat,
+    |_| CutterShape::Ball,
+    |d| CutterShape::Bull { corner_mm: 0.2 * d },
+    |d| CutterShape::V { angle_rad: 1.2, tip_mm: if d < 2.0 { 0.0 } else { 0.3 } },
+    |d| CutterShape::Tapered { tip_mm: 0.5 * d, taper_rad: 0.1 },
+    |d| CutterShape::Table { profile: vec![(0.1, 0.0), (0.3 * d, 0.2), (0.5 * d, 1.0)] },
+];
+
+/// A finishing operation with a ball of this diameter.
+fn finish_along(follow: Follow, diameter_mm: f64, scallop_mm: f64) -> Operation {
+    let op = finish(cutter(CutterShape::Ball, diameter_mm), scallop_mm);
+    Operation { kind: OperationKind::Finish { scallop_mm, follow, angle_rad: 0.0 }, ..op }
+}
+
+/// The ground with the rims of the bumps as outlines.
+fn along_bumps<'a>(target: &'a Heightfield, bumps: &[Bump]) -> Grounds<'a> {
+    let ring = |b: &Bump| -> Vec<DVec2> {
+        (0..60).map(|k| b.at + DVec2::from_angle(f64::from(k) * 0.1047) * b.radius_mm).collect()
+    };
+    let rings: Vec<Vec<DVec2>> = bumps.iter().map(ring).collect();
+    let outlines = crate::surface::Segments::of_rings(rings.iter().map(Vec::as_slice));
+    Grounds::from(target).with_outlines(outlines)
 }
 
 const SIZE: DVec2 = DVec2::new(12.0, 9.0);
@@ -174,6 +188,22 @@ proptest! {
     }
 
     #[test]
+    fn no_cutter_gouges(bumps in bumps(SIZE, 3.0), form in 0..FORMS.len(), d in 1.5f64..3.0, angle in 0.0f64..180.0) {
+        let op = raster(cutter(FORMS[form](d), d), Stepover::Plan(0.6 * d), angle);
+        let job = job(SIZE.x, SIZE.y, 10.0, 0.25, vec![op]);
+        let target = relief(&job, 3.0, 0.0, &bumps);
+        assert_no_gouge(&plan_quietly(&job, &target), &target);
+    }
+
+    #[test]
+    fn a_finish_along_outlines_never_gouges(bumps in bumps(SIZE, 3.0), d in 1.0f64..3.0) {
+        let job = job(SIZE.x, SIZE.y, 10.0, 0.25, vec![finish_along(Follow::Outlines, d, 0.02)]);
+        let target = relief(&job, 3.0, 0.0, &bumps);
+        let paths = plan(&job, &along_bumps(&target, &bumps), &mut |_| {}).unwrap();
+        assert_no_gouge(&paths, &target);
+    }
+
+    #[test]
     fn a_contour_never_gouges(bumps in bumps(SIZE, 3.0), d in prop::sample::select(vec![1.0, 3.0]), steep in 10.0f64..60.0) {
         let job = job(SIZE.x, SIZE.y, 10.0, 0.25, vec![contour(cutter(CutterShape::Ball, d), 0.02, steep)]);
         let target = relief(&job, 3.0, 0.0, &bumps);
@@ -183,7 +213,12 @@ proptest! {
 
     #[test]
     fn a_finish_leaves_no_more_than_asked_wherever_the_cutter_reaches(bumps in bumps(SIZE, 3.0)) {
-        assert_finished(&bumps);
+        assert_finished(&bumps, Follow::Direction);
+    }
+
+    #[test]
+    fn a_finish_along_outlines_leaves_no_more_either(bumps in bumps(SIZE, 3.0)) {
+        assert_finished(&bumps, Follow::Outlines);
     }
 
     #[test]
@@ -679,12 +714,12 @@ fn a_pocket_that_roughing_did_not_reach_is_not_cut_at_full_depth_at_once() {
 
 /// After roughing and finishing with a scallop of 0.02 mm no node stands more than 0.03 mm above the surface that the
 /// ball can leave, by stamping and by distances to triangles.
-fn assert_finished(bumps: &[Bump]) {
-    let [flat, ball] = [cutter(CutterShape::Flat, 2.0), cutter(CutterShape::Ball, 2.0)];
-    let job = job(SIZE.x, SIZE.y, 10.0, 0.2, vec![rough(flat, 0.3, 1.0), finish(ball, 0.02)]);
+fn assert_finished(bumps: &[Bump], follow: Follow) {
+    let roughing = rough(cutter(CutterShape::Flat, 2.0), 0.3, 1.0);
+    let job = job(SIZE.x, SIZE.y, 10.0, 0.2, vec![roughing, finish_along(follow, 2.0, 0.02)]);
     let target = relief(&job, 3.0, 0.0, bumps);
     let mut wood = Heightfield::flat(*target.grid(), 0.0);
-    for path in &plan_quietly(&job, &target) {
+    for path in &plan(&job, &along_bumps(&target, bumps), &mut |_| {}).unwrap() {
         for m in &path.moves {
             lower(&mut wood, &Profile::of(&path.cutter), m);
         }
@@ -710,12 +745,9 @@ fn assert_finished(bumps: &[Bump]) {
 /// A tower so near to the corner of the stock that its side can only be reached from the corner itself.
 #[test]
 fn a_finish_goes_into_the_corner_of_the_stock() {
-    assert_finished(&[Bump {
-        at: DVec2::new(9.105, 7.238),
-        radius_mm: 2.422,
-        height_mm: 2.975,
-        wall: true,
-    }]);
+    let at = DVec2::new(9.105, 7.238);
+    let tower = Bump { at, radius_mm: 2.422, height_mm: 2.975, wall: true };
+    assert_finished(&[tower], Follow::Direction);
 }
 
 /// The chip of a slot R/3 deep is sin k with cos k = 2/3; a flat one's is the whole feed of a tooth.

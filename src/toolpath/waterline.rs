@@ -8,6 +8,7 @@
 use super::chain::{Span, chains};
 use super::contours::{Edge, chords, contours, reached, runs_with};
 use super::emit::Emitter;
+use super::lead::{Side, with_leads};
 use super::left::{Left, Surfaces};
 use super::order::{Direction, in_order};
 use super::raster::{TOP_MM, clear_deep_wood, link};
@@ -23,6 +24,9 @@ use rayon::prelude::*;
 
 /// The lowest level lies this far above the lowest ground that is asked for, mm.
 const ABOVE_GROUND_MM: f64 = 0.002;
+
+/// Radius of the arcs on which waterlines are met and left, in diameters.
+const LEAD_PER_DIAMETER: f64 = 0.25;
 
 /// What waterlines are planned with.
 pub(super) struct Waterlines<'a> {
@@ -70,7 +74,7 @@ pub(super) fn waterlines(site: &Site, lines: &Waterlines, block: &mut Block, out
         if spans.is_empty() {
             continue;
         }
-        cutter.ride(site, spans, block, out);
+        cutter.ride(site, spans, Side::Left, block, out);
         // The flank may have cleared the walls above.
         let Some(still) = left(block) else { return };
         wanted = still;
@@ -128,12 +132,14 @@ pub(super) fn contour(
     };
     for z in lines.heights(&cells) {
         let mut spans = lines.spans(&cells, z, &cutter, &work);
+        let mut room = Side::Left;
         if cut.milling == Milling::Conventional {
+            room = Side::Right;
             for span in &mut spans {
                 span.reverse();
             }
         }
-        cutter.ride(site, spans, block, out);
+        cutter.ride(site, spans, room, block, out);
     }
     Ok(())
 }
@@ -163,8 +169,15 @@ impl<'a> Rider<'a> {
         }
     }
 
-    /// Cuts the spans of a level and takes them out of `block`.
-    fn ride(&self, site: &Site, spans: Vec<Span>, block: &mut Block, out: &mut Emitter) {
+    /// Cuts the spans of a level, which have room on one side, and takes them out of `block`.
+    fn ride(
+        &self,
+        site: &Site,
+        spans: Vec<Span>,
+        room: Side,
+        block: &mut Block,
+        out: &mut Emitter,
+    ) {
         if spans.is_empty() {
             return;
         }
@@ -175,8 +188,12 @@ impl<'a> Rider<'a> {
         let travel = Travel::new(site.job, site.operation, block);
         let link = |done: &[DVec3], next: &[DVec3]| link(site, &travel, &tracer, done, next);
         let before = out.moves().len();
+        let stock = site.job.stock.bounds();
+        let free = |p: DVec2, z: f64| stock.contains(p) && self.slim.clears(p, z + DROP_MM);
+        let radius_mm = LEAD_PER_DIAMETER * site.operation.cutter.working_mm();
         let chains = chains(nearest_first(spans), Direction::Fixed, link);
-        for chain in in_order(chains, Direction::Fixed, out.at()) {
+        let chains = chains.into_iter().map(|chain| with_leads(chain, room, radius_mm, free));
+        for chain in in_order(chains.collect(), Direction::Fixed, out.at()) {
             let touch_mm = wood.drop(chain[0].truncate());
             out.chain(&chain, touch_mm, &travel);
         }

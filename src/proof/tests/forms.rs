@@ -3,11 +3,14 @@
 use crate::geom::DVec2;
 use crate::job::{CutterShape, Operation, Stepover};
 use crate::proof::{Leftover, ProgramText, prove};
-use crate::toolpath::fixture::{Bump, cutter, finish, job, raster, relief, rough};
+use crate::toolpath::fixture::{Bump, bumps, cutter, finish, job, raster, relief, rough};
 use crate::toolpath::plan;
+use proptest::prelude::*;
+
+const SIZE: DVec2 = DVec2::new(13.0, 9.0);
 
 /// A rolling ground with a dome, a tower with walls and another one at the rim.
-fn bumps() -> Vec<Bump> {
+fn hills() -> Vec<Bump> {
     let bump = |x: f64, y: f64, radius_mm, height_mm, wall| Bump {
         at: DVec2::new(x, y),
         radius_mm,
@@ -22,15 +25,17 @@ fn bumps() -> Vec<Bump> {
 }
 
 fn carve(shape: CutterShape, diameter_mm: f64, stepover: Stepover, angle_deg: f64) {
-    prove_after_roughing(raster(cutter(shape, diameter_mm), stepover, angle_deg));
+    let finishing = raster(cutter(shape.clone(), diameter_mm), stepover, angle_deg);
+    let left = prove_after_roughing(finishing, &hills());
+    assert!(left.reachable.nodes > 100, "{shape:?}: {left:?}");
 }
 
-fn prove_after_roughing(finishing: Operation) -> Leftover {
+fn prove_after_roughing(finishing: Operation, bumps: &[Bump]) -> Leftover {
     let shape = finishing.cutter.shape.clone();
     let roughing = rough(cutter(CutterShape::Flat, 3.0), 0.3, 1.5);
-    let mut job = job(13.0, 9.0, 10.0, 0.2, vec![roughing, finishing]);
+    let mut job = job(SIZE.x, SIZE.y, 10.0, 0.2, vec![roughing, finishing]);
     job.safe_z_mm = 5.0;
-    let target = relief(&job, 3.0, 0.0, &bumps());
+    let target = relief(&job, 3.0, 0.0, bumps);
     let paths = plan(&job, &(&target).into(), &mut |_| {}).unwrap();
     let texts: Vec<String> =
         paths.iter().map(|p| crate::gcode::write::write(p, &[], &job)).collect();
@@ -42,8 +47,25 @@ fn prove_after_roughing(finishing: Operation) -> Leftover {
     let reach = crate::offset::reach(&job, &(&target).into());
     let verdict = prove(&programs, &job, &target, &reach).unwrap();
     assert!(verdict.passed(), "{shape:?}: {:#?}", verdict.failures);
-    assert!(verdict.leftover.reachable.nodes > 100, "{shape:?}: {:?}", verdict.leftover);
     verdict.leftover
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 12, ..ProptestConfig::default() })]
+
+    /// The default recipe on any ground: proved, and nothing within reach is left above the scallop and the gouge tolerance.
+    #[test]
+    fn the_default_recipe_finishes_any_ground(
+        bumps in bumps(SIZE, 3.0), diameter in 1.0f64..3.0, is_tapered: bool,
+    ) {
+        let shape = if is_tapered {
+            CutterShape::Tapered { tip_mm: 0.6 * diameter, taper_rad: 0.08 }
+        } else {
+            CutterShape::Ball
+        };
+        let left = prove_after_roughing(finish(cutter(shape, diameter), 0.01), &bumps);
+        prop_assert!(left.over_fraction == 0.0, "{left:?}");
+    }
 }
 
 #[test]
@@ -68,7 +90,7 @@ fn a_tapered_ball_carves() {
 #[test]
 fn a_tapered_ball_finishes() {
     let shape = CutterShape::Tapered { tip_mm: 1.0, taper_rad: 5_f64.to_radians() };
-    let left = prove_after_roughing(finish(cutter(shape, 3.0), 0.01));
+    let left = prove_after_roughing(finish(cutter(shape, 3.0), 0.01), &hills());
     assert!(left.over_fraction == 0.0, "{left:?}");
 }
 
