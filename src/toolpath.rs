@@ -8,6 +8,7 @@
 //! The program's error budget: chords between exact drops enter the target by at most 0.002 mm, a fitted
 //! line never runs below those chords, and three decimals (z rounded up) cost 0.001 mm.
 
+mod arcs;
 mod chain;
 mod check;
 mod contours;
@@ -33,6 +34,7 @@ pub(crate) mod fixture;
 #[cfg(test)]
 mod tests;
 
+pub use arcs::Arc;
 pub use check::PathFault;
 
 use crate::geom::{Heightfield, Move, MoveKind};
@@ -55,8 +57,10 @@ pub struct Toolpath {
     /// Spindle speed, 1/min.
     pub spindle_rpm: f64,
     /// The moves, each starting where the last one ended; the first starts and the last ends at safe Z.
-    /// Coordinates have three decimals: the program's text holds exactly these.
+    /// Coordinates have three decimals, but for those within arcs: the program's text holds exactly these.
     pub moves: Vec<Move>,
+    /// Which of the moves are chords of arcs, in their order.
+    pub arcs: Vec<Arc>,
 }
 
 /// What an observer of [`plan`] hears.
@@ -147,6 +151,7 @@ const SHORTEST_SPAN_PER_DIAMETER: f64 = 0.3;
 const MOST_SAMPLES: f64 = 1e8;
 
 /// What an operation is planned for.
+#[derive(Clone, Copy)]
 struct Site<'a> {
     job: &'a Job,
     /// As deep as the operation may go.
@@ -231,7 +236,7 @@ fn plan_from(
         let kind = kind_name(operation);
         let cutter = operation.cutter.name.clone();
         observe(PlanEvent::Operation { number: site.number, total, kind, cutter });
-        let mut out = Emitter::new(job, operation);
+        let mut out = Emitter::new(&site);
         match operation.kind {
             OperationKind::Rough { leave_mm, stepdown_mm, stepover_mm, pattern } => {
                 let only_deeper_than_mm = terrace_mm(&job.operations[..index]);
@@ -278,7 +283,7 @@ fn plan_from(
         for note in notes(&site, &out) {
             observe(PlanEvent::Note(note));
         }
-        join(&mut paths, operation, out.into_moves());
+        join(&mut paths, operation, out.finished());
     }
     if paths.is_empty() {
         return Err(ToolpathError::NothingToCut);
@@ -358,7 +363,7 @@ fn notes(site: &Site, out: &Emitter) -> Vec<String> {
 }
 
 /// Puts an operation's moves into the last program when cutter and speed are the same, else into a new one.
-fn join(paths: &mut Vec<Toolpath>, operation: &Operation, moves: Vec<Move>) {
+fn join(paths: &mut Vec<Toolpath>, operation: &Operation, (moves, arcs): (Vec<Move>, Vec<Arc>)) {
     let (Some(first), cutter, kind) = (moves.first(), &operation.cutter, kind_name(operation))
     else {
         return;
@@ -374,6 +379,9 @@ fn join(paths: &mut Vec<Toolpath>, operation: &Operation, moves: Vec<Move>) {
             let between = Move { from: last.to, to: first.from, kind: MoveKind::Rapid, line: 0 };
             path.moves.push(between);
         }
+        let by = path.moves.len();
+        let moved = |arc: Arc| Arc { moves: arc.moves.start + by..arc.moves.end + by, ..arc };
+        path.arcs.extend(arcs.into_iter().map(moved));
         path.moves.extend(moves);
         let kinds = path.name.strip_suffix(&format!("-{}", cutter.name)).unwrap_or(&path.name);
         if !kinds.split('-').any(|word| word == kind) {
@@ -386,5 +394,6 @@ fn join(paths: &mut Vec<Toolpath>, operation: &Operation, moves: Vec<Move>) {
         cutter: cutter.clone(),
         spindle_rpm: operation.spindle_rpm,
         moves,
+        arcs,
     });
 }

@@ -4,9 +4,10 @@
 //! when it changes what the controller already knows; numbers have at most three decimals and no trailing zeros.
 //! A program sets every mode it uses in its first lines; offsets of G92 and G43.1 must be clear, as after a reset.
 
-use crate::geom::{DVec3, MoveKind};
+use crate::geom::arc::{Plane, Turn};
+use crate::geom::{DVec3, Move, MoveKind};
 use crate::job::Job;
-use crate::toolpath::Toolpath;
+use crate::toolpath::{Arc, Toolpath};
 
 /// Longest line that GRBL takes, without the line end.
 pub const MAX_LINE: usize = 79;
@@ -76,12 +77,23 @@ pub fn write(path: &Toolpath, header: &[String], job: &Job) -> String {
         text.word(b'P', micrometres(job.machine.spindle_dwell_s));
         text.raw("\n");
     }
-    let mut state = State { at: [None, None, Some(safe_z)], rapid: true, feed: None };
+    let mut state =
+        State { at: [None, None, Some(safe_z)], motion: "G0", plane: Plane::Xy, feed: None };
     if let Some(first) = path.moves.first() {
         text.travel(&mut state, on_grid(first.from), MoveKind::Rapid);
     }
-    for m in &path.moves {
-        text.travel(&mut state, on_grid(m.to), m.kind);
+    let mut arcs = path.arcs.iter().peekable();
+    let mut k = 0;
+    while let Some(m) = path.moves.get(k) {
+        if let Some(arc) = arcs.next_if(|arc| arc.moves.start == k)
+            && let Some(last) = path.moves[arc.moves.clone()].last()
+        {
+            text.arc(&mut state, arc, m, on_grid(last.to));
+            k = arc.moves.end;
+        } else {
+            text.travel(&mut state, on_grid(m.to), m.kind);
+            k += 1;
+        }
     }
     if let [Some(x), Some(y), Some(z)] = state.at {
         text.travel(&mut state, [x, y, z.max(safe_z)], MoveKind::Rapid);
@@ -94,8 +106,10 @@ pub fn write(path: &Toolpath, header: &[String], job: &Job) -> String {
 struct State {
     /// Position, micrometres; `None` before the program has set it.
     at: [Option<i64>; 3],
-    /// True in G0, false in G1.
-    rapid: bool,
+    /// G0, G1, G2 or G3.
+    motion: &'static str,
+    /// G17, G18 or G19.
+    plane: Plane,
     /// Feed, thousandths of mm/min.
     feed: Option<i64>,
 }
@@ -156,27 +170,61 @@ impl Text {
         if state.at == to.map(Some) {
             return;
         }
-        let (rapid, feed) = match kind {
-            MoveKind::Rapid => (true, None),
-            MoveKind::Feed { feed_mm_per_min } => {
-                (false, Some((feed_mm_per_min * 1000.0).floor() as i64))
-            }
-        };
-        if state.rapid != rapid {
-            self.raw(if rapid { "G0" } else { "G1" });
-            state.rapid = rapid;
+        let motion = if kind == MoveKind::Rapid { "G0" } else { "G1" };
+        self.motion(state, motion);
+        self.axes(state, to);
+        self.feed(state, kind);
+        self.bytes.push(b'\n');
+    }
+
+    /// One line for an arc that begins with the move `first` and ends at `to`.
+    fn arc(&mut self, state: &mut State, arc: &Arc, first: &Move, to: [i64; 3]) {
+        if state.plane != arc.plane {
+            self.raw(match arc.plane {
+                Plane::Xy => "G17",
+                Plane::Zx => "G18",
+                Plane::Yz => "G19",
+            });
+            state.plane = arc.plane;
         }
+        self.motion(state, if arc.turn == Turn::Clockwise { "G2" } else { "G3" });
+        self.axes(state, to);
+        let letters = match arc.plane {
+            Plane::Xy => [b'I', b'J'],
+            Plane::Zx => [b'K', b'I'],
+            Plane::Yz => [b'J', b'K'],
+        };
+        let offset = arc.center - arc.plane.split(first.from).0;
+        for (letter, offset) in letters.into_iter().zip([offset.x, offset.y]) {
+            self.word(letter, micrometres(offset));
+        }
+        self.feed(state, first.kind);
+        self.bytes.push(b'\n');
+    }
+
+    fn motion(&mut self, state: &mut State, motion: &'static str) {
+        if state.motion != motion {
+            self.raw(motion);
+            state.motion = motion;
+        }
+    }
+
+    fn axes(&mut self, state: &mut State, to: [i64; 3]) {
         for (axis, letter) in [b'X', b'Y', b'Z'].into_iter().enumerate() {
             if state.at[axis] != Some(to[axis]) {
                 self.word(letter, to[axis]);
                 state.at[axis] = Some(to[axis]);
             }
         }
-        if feed.is_some() && state.feed != feed {
-            self.word(b'F', feed.unwrap_or(0));
-            state.feed = feed;
+    }
+
+    fn feed(&mut self, state: &mut State, kind: MoveKind) {
+        let MoveKind::Feed { feed_mm_per_min } = kind else { return };
+        let feed = (feed_mm_per_min * 1000.0).floor() as i64;
+        if state.feed != Some(feed) {
+            self.word(b'F', feed);
+            state.feed = Some(feed);
         }
-        self.bytes.push(b'\n');
     }
 
     /// A letter and a number given in thousandths, without trailing zeros.

@@ -95,6 +95,14 @@ pub enum PathFault {
         /// Name of the machine.
         machine: String,
     },
+    /// An arc is no run of feed moves at one speed, or overlaps another.
+    #[error("toolpath '{name}', move {index}: an arc is not made of feed moves at one speed")]
+    BadArc {
+        /// Name of the toolpath.
+        name: String,
+        /// Its first move.
+        index: usize,
+    },
     /// The tip leaves the box of the stock: its rectangle, its underside or the safe height.
     #[error(
         "toolpath '{name}', move {index}: the tip leaves the stock's rectangle, underside or the safe height at {at}"
@@ -115,7 +123,8 @@ const GRID_MM: f64 = 0.0011;
 impl Toolpath {
     /// Checks the laws of every toolpath: moves are continuous and finite, start and end at safe Z, stay above the
     /// stock's rectangle and within the machine's travel; rapids are vertical, level or at safe Z; feeds are
-    /// positive and go down no faster than the plunge limit of the operations that use this cutter.
+    /// positive and go down no faster than the plunge limit of the operations that use this cutter; arcs are made of feed
+    /// moves at one speed, one after the other.
     ///
     /// # Errors
     /// The first [`PathFault`] found.
@@ -129,6 +138,15 @@ impl Toolpath {
             if z_mm.is_nan() || (z_mm - safe_z_mm).abs() > GRID_MM {
                 return Err(PathFault::EndsLow { name: name(), z_mm, safe_z_mm });
             }
+        }
+        let mut free_from = 0;
+        for arc in &self.arcs {
+            let moves = self.moves.get(arc.moves.clone()).unwrap_or_default();
+            let is_whole = moves.iter().all(|m| !m.is_rapid() && m.kind == moves[0].kind);
+            if moves.is_empty() || !is_whole || arc.moves.start < free_from {
+                return Err(PathFault::BadArc { name: name(), index: arc.moves.start });
+            }
+            free_from = arc.moves.end;
         }
         let plunge = self.plunge_limit(job);
         let (mut low, mut high) = (first.from, first.from);

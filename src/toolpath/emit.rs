@@ -1,10 +1,15 @@
 //! Chains -> moves: rapids, entries, feeds, and coordinates on the grid of the written program.
 
+use super::Site;
+use super::arcs::{Arc, Fitter};
 use super::ramp::ramp_onto;
+use super::trace::{DROP_MM, LEAST_ROUNDING_MM};
 use super::travel::{RAMP_GAP_MM, Travel};
+use crate::cutter::Profile;
 use crate::geom::{DVec3, Move, MoveKind};
-use crate::job::{Job, Machine, Operation};
-use crate::stock::Contact;
+use crate::job::{Job, Machine, Operation, OperationKind};
+use crate::offset::Dropper;
+use crate::stock::{Block, Contact};
 use std::collections::VecDeque;
 
 /// A feed is set by the wood that is met within this distance before and after, mm.
@@ -20,7 +25,11 @@ pub(super) fn on_program_grid(p: DVec3) -> DVec3 {
 pub(super) struct Emitter<'a> {
     job: &'a Job,
     operation: &'a Operation,
+    /// The cutter slimmed by the error budget over the ground, inflated by the allowance.
+    slim: Dropper<'a>,
+    leave_mm: f64,
     moves: Vec<Move>,
+    arcs: Vec<Arc>,
     /// Chains left out because they have no room to ramp.
     skipped: usize,
     /// Depth of a pass that is deeper than one should be, mm; else 0.
@@ -28,8 +37,16 @@ pub(super) struct Emitter<'a> {
 }
 
 impl<'a> Emitter<'a> {
-    pub(super) fn new(job: &'a Job, operation: &'a Operation) -> Self {
-        Self { job, operation, moves: Vec::new(), skipped: 0, deepest_pass_mm: 0.0 }
+    pub(super) fn new(site: &Site<'a>) -> Self {
+        let Site { job, operation, target, .. } = *site;
+        let leave_mm = match operation.kind {
+            OperationKind::Rough { leave_mm, .. } => leave_mm,
+            _ => 0.0,
+        };
+        let profile = Profile::of(&operation.cutter).inflated(leave_mm).rolled(LEAST_ROUNDING_MM);
+        let slim = Dropper::new(target, profile.slimmed(DROP_MM));
+        let (moves, arcs) = (Vec::new(), Vec::new());
+        Self { job, operation, slim, leave_mm, moves, arcs, skipped: 0, deepest_pass_mm: 0.0 }
     }
 
     /// The moves so far: they start and end at safe Z.
@@ -56,13 +73,13 @@ impl<'a> Emitter<'a> {
         self.deepest_pass_mm = self.deepest_pass_mm.max(depth_mm);
     }
 
-    /// The moves, the last of which lifts to safe Z.
-    pub(super) fn into_moves(mut self) -> Vec<Move> {
+    /// The moves, the last of which lifts to safe Z, and the arcs among them.
+    pub(super) fn finished(mut self) -> (Vec<Move>, Vec<Arc>) {
         if let Some(last) = self.moves.last() {
             let at = last.to;
             self.rapid(at, at.with_z(self.job.safe_z_mm));
         }
-        self.moves
+        (self.moves, self.arcs)
     }
 
     /// Goes to the start of the chain, enters and cuts; the tool stays down. `wood_mm`: the height of the tip at which the
@@ -94,9 +111,25 @@ impl<'a> Emitter<'a> {
         }
     }
 
+    /// Done with a set of passes, whose moves begin at `first`: makes arcs of them where that saves lines, takes them out of
+    /// `block`, and sets their feeds by the wood that they meet.
+    pub(super) fn cut(&mut self, first: usize, profile: &Profile, block: &mut Block) {
+        let passes = self.moves.split_off(first);
+        let stock = self.job.stock.bounds();
+        let free = |p: DVec3| {
+            let q = p.truncate();
+            stock.contains(q) && self.slim.clears(q, p.z + DROP_MM - self.leave_mm)
+        };
+        let fitter = Fitter::new(self.operation, self.job);
+        let first_arc = self.arcs.len();
+        fitter.fit(&passes, free, &mut self.moves, &mut self.arcs);
+        let contacts = block.cut(profile, &self.moves[first..]);
+        self.settle_feeds(first, first_arc, &contacts);
+    }
+
     /// Sets the feeds of the moves from `first` on by the wood that they take (`contacts`, one for each), looking a little
-    /// ahead and back: where it is little the cutter goes faster, where it is deep slower.
-    pub(super) fn settle_feeds(&mut self, first: usize, contacts: &[Contact]) {
+    /// ahead and back: where it is little the cutter goes faster, where it is deep slower. An arc has one feed.
+    fn settle_feeds(&mut self, first: usize, first_arc: usize, contacts: &[Contact]) {
         let moves = &self.moves[first..];
         let thickest = most_nearby(moves, |k| f64::from(contacts[k].deepest_mm));
         let chips = most_nearby(moves, |k| f64::from(contacts[k].chip));
@@ -108,7 +141,12 @@ impl<'a> Emitter<'a> {
                 let most = base * ((gain * 8.0 + 1e-9).floor() / 8.0).max(0.25);
                 feed(m.to - m.from, most, self.operation, &self.job.machine)
             });
-        let speeds: Vec<f64> = speeds.collect();
+        let mut speeds: Vec<f64> = speeds.collect();
+        for arc in &self.arcs[first_arc..] {
+            let chords = &mut speeds[arc.moves.start - first..arc.moves.end - first];
+            let slowest = chords.iter().copied().fold(f64::INFINITY, f64::min);
+            chords.fill(slowest);
+        }
         for (m, feed_mm_per_min) in self.moves[first..].iter_mut().zip(speeds) {
             if !m.is_rapid() {
                 m.kind = MoveKind::Feed { feed_mm_per_min };

@@ -58,8 +58,7 @@ pub(super) fn finish(
         return Ok(());
     };
     out.note_deep_pass(done.deepest_mm);
-    let contacts = block.cut(&profile, &out.moves()[done.first..]);
-    out.settle_feeds(done.first, &contacts);
+    out.cut(done.first, &profile, block);
     let rolled = profile.rolled(LEAST_ROUNDING_MM);
     let tip = tip_field(site.target, &rolled);
     let reach = closing(&tip, &rolled);
@@ -79,8 +78,7 @@ pub(super) fn finish(
         let (stepover_mm, angle_rad) = (closer * stepover_mm, angle_rad + turn);
         let across = Passes { stepover_mm, angle_rad, only: Some(&only) };
         let done = passes(site, &across, block, out)?;
-        let contacts = block.cut(&profile, &out.moves()[done.first..]);
-        out.settle_feeds(done.first, &contacts);
+        out.cut(done.first, &profile, block);
     }
     Ok(())
 }

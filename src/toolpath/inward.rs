@@ -166,7 +166,9 @@ fn nearest_first(spans: Vec<Span>) -> Vec<Span> {
     let plan = |span: &Span| -> Vec<DVec2> { span.iter().map(|p| p.truncate()).collect() };
     let pass = |span: Span| {
         let mut bounds = Bounds::EMPTY;
-        plan(&span).into_iter().for_each(|p| bounds.add(p));
+        for p in plan(&span) {
+            bounds.add(p);
+        }
         Pass { span, bounds }
     };
     let mut left: Vec<Pass> = spans.into_iter().map(pass).collect();

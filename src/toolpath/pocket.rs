@@ -31,6 +31,8 @@ pub(super) const FILM_MM: f64 = 0.01;
 const RING_FIT_MM: f64 = 0.02;
 /// A cutter rounded by less is pointed, mm.
 const LEAST_ROUND_MM: f64 = 0.5;
+/// Points on the rim of the stock may miss it by this much of rounding, mm.
+const RIM_MM: f64 = 1e-6;
 /// A way over free ground may be this many stepovers long before the tool is lifted.
 const LINK_STEPOVERS: f64 = 3.0;
 
@@ -59,6 +61,8 @@ struct Ring {
 /// What a level is planned with.
 struct Level<'a> {
     z: f64,
+    /// The stock's rectangle: the axis stays inside it.
+    stock: Bounds,
     cut: &'a Pockets,
     /// Lowest height that the allowance leaves to the tip.
     allowed: &'a Heightfield,
@@ -102,6 +106,7 @@ pub(super) fn pockets(
         let wood = tip_field(block.field(), &disc);
         let level = Level {
             z,
+            stock: site.job.stock.bounds().grown(RIM_MM),
             cut,
             allowed: &allowed,
             cells: &cells,
@@ -118,8 +123,7 @@ pub(super) fn pockets(
             let wood_mm = block.highest_under(profile.radius_mm(), chain[0].truncate());
             out.chain(&chain, wood_mm, &travel);
         }
-        let contacts = block.cut(&profile, &out.moves()[before..]);
-        out.settle_feeds(before, &contacts);
+        out.cut(before, &profile, block);
     }
     Ok(())
 }
@@ -127,7 +131,7 @@ pub(super) fn pockets(
 impl Level<'_> {
     /// True where the tip may be at this height.
     fn is_free(&self, p: DVec2) -> bool {
-        self.slim.clears(p, self.z + DROP_MM - self.cut.leave_mm)
+        self.stock.contains(p) && self.slim.clears(p, self.z + DROP_MM - self.cut.leave_mm)
     }
 
     /// [`Level::is_free`] far from the walls: at all corners of the cell. What a round or flat cutter could meet between

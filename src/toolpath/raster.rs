@@ -76,8 +76,7 @@ pub(super) fn raster(
     let done = passes_where_wood_is_left(site, &first, limit_mm, block, out)?;
     if let Some(done) = done {
         out.note_deep_pass(done.deepest_mm);
-        let contacts = block.cut(&profile, &out.moves()[done.first..]);
-        out.settle_feeds(done.first, &contacts);
+        out.cut(done.first, &profile, block);
     }
     Ok(())
 }

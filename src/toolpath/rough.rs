@@ -127,8 +127,7 @@ pub(super) fn rough(
             let wood = block.highest_under(profile.radius_mm(), chain[0].truncate());
             out.chain(&chain, wood, &travel);
         }
-        let contacts = block.cut(&profile, &out.moves()[before..]);
-        out.settle_feeds(before, &contacts);
+        out.cut(before, &profile, block);
     }
     Ok(())
 }

@@ -5,6 +5,7 @@ use super::fixture::{Bump, bumps, contour, cutter, finish, job, raster, relief, 
 use super::trace::{Sample, Tracer};
 use super::*;
 use crate::cutter::Profile;
+use crate::geom::arc::{Plane, Turn};
 use crate::geom::{DVec2, DVec3, Grid};
 use crate::job::{CutterShape, Pattern, Stepover};
 use crate::offset::Dropper;
@@ -662,6 +663,12 @@ fn broken_paths_are_found_out() {
     assert!(matches!(broken(&Vec::clear), PathFault::Empty { .. }));
     assert!(matches!(broken(&|m| _ = m.remove(3)), PathFault::Gap { index: 3, .. }));
     assert!(matches!(broken(&|m| _ = m.pop()), PathFault::EndsLow { .. }));
+    for moves in [0..2, 5..5, 0..usize::MAX] {
+        let mut path = good.clone();
+        let (plane, turn, center) = (Plane::Xy, Turn::Clockwise, DVec2::ZERO);
+        path.arcs = vec![Arc { moves, plane, turn, center }];
+        assert!(matches!(path.check(&job), Err(PathFault::BadArc { .. })));
+    }
     assert!(matches!(broken(&|m| m[down].kind = feed(5000.0)), PathFault::Plunge { .. }));
     assert!(matches!(broken(&|m| m[down].kind = feed(0.0)), PathFault::BadFeed { .. }));
     assert!(matches!(
@@ -773,4 +780,21 @@ fn feeds_rise_as_chips_get_thinner() {
     let v = CutterShape::V { angle_rad: 1.0, tip_mm: 0.0 };
     let v = rough(fixture::cutter(v, 6.0), 0.5, 1.5);
     assert_eq!(v.feed_limit_mm_per_min(0.1, 0.1), v.feed_mm_per_min);
+}
+
+/// The grid reaches beyond the rim then; the tool does not.
+#[test]
+fn a_stock_that_is_no_whole_number_of_cells_is_kept_to() {
+    let op = finish(cutter(CutterShape::Ball, 2.0), 0.02);
+    let ops = vec![
+        rough(cutter(CutterShape::Flat, 2.0), 0.3, 1.0),
+        contour(cutter(CutterShape::Ball, 3.0), 0.02, 20.0),
+        op,
+    ];
+    let job = job(12.07, 9.13, 10.0, 0.25, ops);
+    let tower =
+        |x: f64, y: f64| Bump { at: DVec2::new(x, y), radius_mm: 2.3, height_mm: 2.4, wall: true };
+    let target = relief(&job, 3.0, 0.0, &[tower(12.0, 4.0), tower(4.0, 9.0), tower(10.5, 7.5)]);
+    assert!(target.grid().bounds().max.x > 12.1);
+    assert_no_gouge(&plan_quietly(&job, &target), &target);
 }

@@ -16,7 +16,7 @@ use super::trace::{DROP_MM, LEAST_ROUNDING_MM, Tracer};
 use super::travel::Travel;
 use super::{Site, ToolpathError};
 use crate::cutter::Profile;
-use crate::geom::{DVec2, DVec3, Heightfield};
+use crate::geom::{Bounds, DVec2, DVec3, Heightfield};
 use crate::job::Milling;
 use crate::offset::{Dropper, closing, tip_field};
 use crate::stock::Block;
@@ -151,6 +151,8 @@ fn corners(node: usize, nx: usize) -> [usize; 4] {
 
 /// The cutter with what follows the target under it.
 struct Rider<'a> {
+    /// The stock's rectangle: the axis stays inside it.
+    stock: Bounds,
     profile: Profile,
     rolled: Profile,
     exact: Dropper<'a>,
@@ -162,11 +164,17 @@ impl<'a> Rider<'a> {
     fn new(site: &Site<'a>, profile: &Profile) -> Self {
         let rolled = profile.rolled(LEAST_ROUNDING_MM);
         Self {
+            stock: site.job.stock.bounds(),
             profile: profile.clone(),
             exact: Dropper::new(site.target, rolled.clone()),
             slim: Dropper::new(site.target, rolled.slimmed(DROP_MM)),
             rolled,
         }
+    }
+
+    /// True where the tip may be at height `z`.
+    fn is_free(&self, p: DVec2, z: f64) -> bool {
+        self.stock.contains(p) && self.slim.clears(p, z + DROP_MM)
     }
 
     /// Cuts the spans of a level, which have room on one side, and takes them out of `block`.
@@ -188,17 +196,16 @@ impl<'a> Rider<'a> {
         let travel = Travel::new(site.job, site.operation, block);
         let link = |done: &[DVec3], next: &[DVec3]| link(site, &travel, &tracer, done, next);
         let before = out.moves().len();
-        let stock = site.job.stock.bounds();
-        let free = |p: DVec2, z: f64| stock.contains(p) && self.slim.clears(p, z + DROP_MM);
         let radius_mm = LEAD_PER_DIAMETER * site.operation.cutter.working_mm();
         let chains = chains(nearest_first(spans), Direction::Fixed, link);
-        let chains = chains.into_iter().map(|chain| with_leads(chain, room, radius_mm, free));
+        let chains = chains
+            .into_iter()
+            .map(|chain| with_leads(chain, room, radius_mm, |p, z| self.is_free(p, z)));
         for chain in in_order(chains.collect(), Direction::Fixed, out.at()) {
             let touch_mm = wood.drop(chain[0].truncate());
             out.chain(&chain, touch_mm, &travel);
         }
-        let contacts = block.cut(&self.profile, &out.moves()[before..]);
-        out.settle_feeds(before, &contacts);
+        out.cut(before, &self.profile, block);
     }
 }
 
@@ -230,10 +237,11 @@ impl Waterlines<'_> {
     ) -> Vec<Span> {
         let fit_mm = self.fit_mm;
         let contours = self.contours(cells, z, &cutter.exact);
-        let free = |p: DVec2| cutter.slim.clears(p, z + DROP_MM);
-        let cut = |contour: &Vec<DVec2>| {
-            let runs = runs_with(contour, work);
-            runs.into_iter().flat_map(|run| chords(&run, fit_mm, free)).collect::<Vec<_>>()
+        let inside = |p: &DVec2| cutter.stock.contains(*p);
+        let cut = |contour: &Vec<DVec2>| -> Vec<Vec<DVec2>> {
+            let parts = contour.chunk_by(|a, b| inside(a) == inside(b));
+            let runs = parts.filter(|part| inside(&part[0])).flat_map(|part| runs_with(part, work));
+            runs.flat_map(|run| chords(&run, fit_mm, |p| cutter.is_free(p, z))).collect()
         };
         let plans = contours.par_iter().flat_map_iter(cut);
         plans.map(|plan| plan.into_iter().map(|p| p.extend(z)).collect()).collect()

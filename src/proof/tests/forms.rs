@@ -24,7 +24,7 @@ fn hills() -> Vec<Bump> {
     ]
 }
 
-fn carve(shape: CutterShape, diameter_mm: f64, stepover: Stepover, angle_deg: f64) {
+fn carve(shape: &CutterShape, diameter_mm: f64, stepover: Stepover, angle_deg: f64) {
     let finishing = raster(cutter(shape.clone(), diameter_mm), stepover, angle_deg);
     let left = prove_after_roughing(finishing, &hills());
     assert!(left.reachable.nodes > 100, "{shape:?}: {left:?}");
@@ -71,20 +71,20 @@ proptest! {
 #[test]
 fn a_v_cutter_carves() {
     let shape = CutterShape::V { angle_rad: 60_f64.to_radians(), tip_mm: 0.2 };
-    carve(shape, 6.0, Stepover::Plan(0.2), 0.0);
+    carve(&shape, 6.0, Stepover::Plan(0.2), 0.0);
 }
 
 #[test]
 fn a_pointed_v_cutter_carves() {
     let shape = CutterShape::V { angle_rad: 90_f64.to_radians(), tip_mm: 0.0 };
-    carve(shape, 6.0, Stepover::Plan(0.4), 30.0);
+    carve(&shape, 6.0, Stepover::Plan(0.4), 30.0);
 }
 
 #[test]
 fn a_tapered_ball_carves() {
     let shape = CutterShape::Tapered { tip_mm: 1.0, taper_rad: 5_f64.to_radians() };
-    carve(shape.clone(), 1.2, Stepover::Scallop(0.02), 90.0);
-    carve(shape, 3.0, Stepover::Scallop(0.03), 0.0);
+    carve(&shape, 1.2, Stepover::Scallop(0.02), 90.0);
+    carve(&shape, 3.0, Stepover::Scallop(0.03), 0.0);
 }
 
 #[test]
@@ -96,11 +96,11 @@ fn a_tapered_ball_finishes() {
 
 #[test]
 fn a_bull_nose_carves() {
-    carve(CutterShape::Bull { corner_mm: 0.5 }, 3.0, Stepover::Plan(0.3), 0.0);
+    carve(&CutterShape::Bull { corner_mm: 0.5 }, 3.0, Stepover::Plan(0.3), 0.0);
 }
 
 #[test]
 fn a_profile_table_carves() {
     let shape = CutterShape::Table { profile: vec![(0.2, 0.0), (0.9, 0.3), (1.5, 1.0)] };
-    carve(shape, 3.0, Stepover::Plan(0.4), 0.0);
+    carve(&shape, 3.0, Stepover::Plan(0.4), 0.0);
 }
