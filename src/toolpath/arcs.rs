@@ -159,9 +159,8 @@ impl Fitter {
         // From the start, in thousandths: that is what the program says.
         let center = a + ((center - a) * 1000.0).round() / 1000.0;
         let radius = a.distance(center);
-        if !RADII_MM.contains(&radius)
-            || (b.distance(center) - radius).abs() > RADII_DIFFER_MM.min(1e-3 * radius.max(1.0))
-        {
+        let differ = (b.distance(center) - radius).abs();
+        if !RADII_MM.contains(&radius) || differ > RADII_DIFFER_MM {
             return None;
         }
         let turn = if (m - a).perp_dot(b - m) > 0.0 { 1.0 } else { -1.0 };
