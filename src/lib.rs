@@ -52,6 +52,7 @@ pub mod cli;
 use artwork::{Artwork, ArtworkError};
 use geom::{DVec3, Move, MoveKind};
 use job::{Draft, Job, JobError};
+use motion::RELIABLE_LINES_PER_S;
 use outline::{OutlineError, Outlines};
 use proof::{ProgramText, ProofError, Verdict};
 use relief::{Grounds, Relief, ReliefError};
@@ -148,6 +149,13 @@ pub fn carve(
         .map(|(p, path)| ProgramText { name: &p.name, text: &p.text, cutter: &path.cutter })
         .collect();
     let verdict = proof::prove(&texts, job, target, &reach)?;
+    for p in verdict.programs.iter().filter(|p| p.flow.lines_per_s > RELIABLE_LINES_PER_S) {
+        notes.push(format!(
+            "{}: up to {} lines in a second, where controllers manage {RELIABLE_LINES_PER_S} reliably; \
+             a coarser tolerance or a lower feed_mm_per_min spares the stutter",
+            p.name, p.flow.lines_per_s
+        ));
+    }
     Ok(Carving { design, paths, programs, verdict, notes })
 }
 

@@ -6,18 +6,22 @@
 //! (or drained), with what the ring then knows; a ring is always full unless the serial line cannot keep up
 //! ([`Planner::with_baud`]).
 
+mod flow;
 mod limits;
 mod ring;
 mod stepper;
 mod supply;
 
+pub use flow::{Flow, RELIABLE_LINES_PER_S};
 pub use limits::Limits;
 pub use ring::{Overrides, Pace, RING_BLOCKS, Ring};
 pub use stepper::Stepper;
 
 use crate::geom::{Move, MoveKind};
 use crate::job::Machine;
+use flow::Gauge;
 use ring::Block;
+use std::collections::VecDeque;
 use supply::Supply;
 
 /// Where the time goes, s.
@@ -42,6 +46,9 @@ impl Times {
 #[derive(Debug, Clone)]
 pub struct Planner {
     ring: Ring,
+    /// The line of each block in the ring.
+    lines: VecDeque<u32>,
+    gauge: Gauge,
     /// Settled entry speed of the oldest block, squared.
     entry2: f64,
     times: Times,
@@ -57,6 +64,8 @@ impl Planner {
     pub fn new(machine: &Machine) -> Self {
         Self {
             ring: Ring::new(Limits::from(machine)),
+            lines: VecDeque::new(),
+            gauge: Gauge::default(),
             entry2: 0.0,
             times: Times::default(),
             supply: None,
@@ -92,8 +101,11 @@ impl Planner {
             MoveKind::Feed { feed_mm_per_min } => Pace::Feed(feed_mm_per_min / 60.0),
         };
         let steps = std::array::from_fn(|k| to[k] - from[k]);
-        if self.ring.push(steps, pace) && self.ring.is_full() {
-            self.settle_oldest();
+        if self.ring.push(steps, pace) {
+            self.lines.push_back(mv.line);
+            if self.ring.is_full() {
+                self.settle_oldest();
+            }
         }
     }
 
@@ -114,6 +126,11 @@ impl Planner {
     /// Where the time of all settled blocks went; everything pushed is settled after [`Planner::sync`].
     pub fn times(&self) -> Times {
         self.times
+    }
+
+    /// What all settled blocks ask of the controller, and what speeds they reach.
+    pub fn flow(&self) -> Flow {
+        self.gauge.flow()
     }
 
     /// Time at rest because the serial line was too slow, s; 0 without [`Planner::with_baud`].
@@ -148,7 +165,7 @@ impl Planner {
     /// Fixes the exit speed of the oldest block with all the ring knows, adds its time and lets it go.
     fn settle_oldest(&mut self) {
         let exit2 = self.ring.front().map_or(0.0, |b| self.ring.exit2(self.entry2, b.length));
-        let Some(block) = self.ring.pop() else { return };
+        let (Some(block), Some(line)) = (self.ring.pop(), self.lines.pop_front()) else { return };
         let seconds = trapezoid_s(&block, self.entry2, exit2);
         if block.is_rapid() {
             self.times.rapid_s += seconds;
@@ -156,6 +173,7 @@ impl Planner {
             self.times.feed_s += seconds;
         }
         self.entry2 = exit2;
+        self.gauge.ends(&block, line, self.clock_s(), seconds);
     }
 }
 

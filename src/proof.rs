@@ -22,7 +22,7 @@ pub use time::run as run_time;
 use crate::gcode::read::ReadError;
 use crate::geom::Heightfield;
 use crate::job::{CutterSpec, Job};
-use crate::motion::Times;
+use crate::motion::{Flow, Times};
 use deviation::Held;
 use failure::Ledger;
 use oracle::Track;
@@ -76,10 +76,16 @@ pub struct ProgramReport {
     pub moves: usize,
     /// Where the time goes.
     pub times: Times,
+    /// What it asks of the controller, and the speeds that it reaches.
+    pub flow: Flow,
     /// All the time, s.
     pub seconds: f64,
     /// Length of the feed moves, mm.
     pub cutting_mm: f64,
+    /// Length of the feed moves that meet no wood, mm.
+    pub air_mm: f64,
+    /// How often the program lifts to the safe height or lower and comes down again.
+    pub retracts: usize,
     /// Length of the rapids, mm.
     pub rapid_mm: f64,
     /// Lowest height of the tip, mm.

@@ -149,7 +149,10 @@ fn report_data(carving: &Carving) -> ReportData {
                     .map(|o| o.feed_mm_per_min)
                     .fold(0.0, f64::max),
                 lines: p.lines as usize,
+                lines_per_s: p.flow.lines_per_s,
+                reached_mm_per_min: p.flow.reached_mm_per_min,
                 cutting_mm: p.cutting_mm,
+                air_mm: p.air_mm,
                 deepest_mm: p.lowest_mm,
                 time_s: p.seconds,
             })

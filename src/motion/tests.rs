@@ -79,6 +79,41 @@ fn the_ring_of_blocks_caps_the_speed_of_tiny_moves() {
 }
 
 #[test]
+fn the_flow_tells_lines_and_speeds() {
+    // 300 lines of 0.1 mm asked for at 600 mm/min: 100 lines a second when up to speed, well below what 14 of them allow.
+    let n = 300;
+    let pieces: Vec<Move> = (0..n)
+        .map(|k| {
+            let (x, line) = (f64::from(k), k + 1);
+            Move { line, ..feed(DVec3::X * x * 0.1, DVec3::X * (x + 1.0) * 0.1, 600.0) }
+        })
+        .collect();
+    let run = |moves: &[Move]| {
+        let mut planner = Planner::new(&machine());
+        for m in moves {
+            planner.push(m);
+        }
+        planner.sync();
+        (planner.flow(), planner.times().feed_s)
+    };
+    let (flow, feed_s) = run(&pieces);
+    assert!((99..=101).contains(&flow.lines_per_s), "{flow:?}");
+    assert!((flow.asked_mm_per_min - 600.0).abs() < 1e-6, "{flow:?}");
+    assert!((flow.reached_mm_per_min - 60.0 * 30.0 / feed_s).abs() < 1e-6, "{flow:?}");
+    // As the chords of arcs of ten each, it is a tenth of the lines.
+    let arcs: Vec<Move> =
+        pieces.iter().map(|m| Move { line: (m.line - 1) / 10 + 1, ..*m }).collect();
+    assert!((10..=11).contains(&run(&arcs).0.lines_per_s));
+    // Rapids are no feed.
+    let end = pieces[pieces.len() - 1].to;
+    let rapid = Move { from: end, to: DVec3::ZERO, line: n + 1, kind: MoveKind::Rapid };
+    assert_eq!(
+        run(&[pieces.clone(), vec![rapid]].concat()).0.asked_mm_per_min,
+        flow.asked_mm_per_min
+    );
+}
+
+#[test]
 fn a_dwell_drains_and_is_counted_apart() {
     let a = feed(DVec3::ZERO, DVec3::X * 10.0, 1800.0);
     let b = feed(DVec3::X * 10.0, DVec3::X * 20.0, 1800.0);

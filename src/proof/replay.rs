@@ -6,11 +6,14 @@ use crate::cutter::Profile;
 use crate::gcode::read::{self, EventKind, Program};
 use crate::geom::{Bounds, DVec2, DVec3, Grid, Heightfield, Move, MoveKind};
 use crate::job::{CutterSpec, Job, Operation};
-use crate::motion::Planner;
+use crate::motion::{Flow, Planner, Times};
 use crate::stock::{Block, Contact};
 
 /// Less wood than this removed by moves with one fault is a touch, not a cut, mm.
 const IN_WOOD_MM: f64 = 0.01;
+
+/// A feed move that removes less than this is an air cut, mm.
+const AIR_MM: f64 = 1e-4;
 
 /// A faultless move longer than this ends a run of faulty ones, mm.
 const RUN_BREAK_MM: f64 = 0.1;
@@ -148,17 +151,22 @@ impl Case<'_> {
             self.check_place(m);
         }
         self.check_spindle(&contacts);
-        let times = self.times();
+        let (times, flow) = self.times();
         let length = |rapid: bool| {
             moves.iter().filter(|m| m.is_rapid() == rapid).map(Move::length_mm).sum::<f64>()
         };
+        let pairs = moves.iter().zip(&contacts);
+        let air = pairs.filter(|(m, c)| !m.is_rapid() && f64::from(c.deepest_mm) <= AIR_MM);
         ProgramReport {
             name: self.text.name.to_owned(),
             lines: self.program.lines,
             moves: moves.len(),
             times,
+            flow,
             seconds: times.total_s(),
             cutting_mm: length(false),
+            air_mm: air.map(|(m, _)| m.length_mm()).sum(),
+            retracts: moves.windows(2).filter(|w| !w[0].is_rapid() && w[1].is_rapid()).count(),
             rapid_mm: length(true),
             lowest_mm: if moves.is_empty() { self.job.safe_z_mm } else { lowest_mm },
             engaged_mm: contacts.iter().map(|c| f64::from(c.engaged_mm)).fold(0.0, f64::max),
@@ -467,11 +475,11 @@ impl Case<'_> {
         }
     }
 
-    /// Time by the model of the planner.
-    fn times(&self) -> crate::motion::Times {
+    /// Time and flow by the model of the planner.
+    fn times(&self) -> (Times, Flow) {
         let mut planner = Planner::new(&self.job.machine);
         time::run(self.program, &[], &mut planner);
-        planner.times()
+        (planner.times(), planner.flow())
     }
 }
 

@@ -99,8 +99,14 @@ pub struct ProgramRow {
     pub feed_mm_per_min: f64,
     /// Lines of the program.
     pub lines: usize,
+    /// Most lines that the controller has to take within a second.
+    pub lines_per_s: usize,
+    /// Mean speed that the feed moves reach, mm/min.
+    pub reached_mm_per_min: f64,
     /// Length of its feed moves, mm.
     pub cutting_mm: f64,
+    /// Length of those that meet no wood, mm.
+    pub air_mm: f64,
     /// Lowest Z it goes to, mm.
     pub deepest_mm: f64,
     /// Time by the model of the controller's planner, s.
@@ -216,6 +222,9 @@ pub(super) mod tests {
             spindle_rpm: 18_000.0,
             feed_mm_per_min: 2400.0,
             lines: 48_213,
+            lines_per_s: 63,
+            reached_mm_per_min: 1104.0,
+            air_mm: 0.02 * cutting_mm,
             cutting_mm,
             deepest_mm: -9.0,
             time_s,

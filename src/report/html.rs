@@ -79,8 +79,8 @@ fn programs(data: &ReportData) -> Markup {
                 thead {
                     tr {
                         th { "File" } th { "Cutter" }
-                        th.n { "Spindle, 1/min" } th.n { "Feed, mm/min" } th.n { "Lines" }
-                        th.n { "Cutting, m" } th.n { "Deepest, mm" } th.n { "Time" }
+                        th.n { "Spindle, 1/min" } th.n { "Feed, mm/min" } th.n { "reached" } th.n { "Lines" }
+                        th.n { "at most, 1/s" } th.n { "Cutting, m" } th.n { "in air" } th.n { "Deepest, mm" } th.n { "Time" }
                     }
                 }
                 tbody {
@@ -89,8 +89,11 @@ fn programs(data: &ReportData) -> Markup {
                             td { code { (p.file) } } td { (p.cutter) }
                             td.n { (format!("{:.0}", p.spindle_rpm)) }
                             td.n { (format!("{:.0}", p.feed_mm_per_min)) }
+                            td.n { (format!("{:.0}", p.reached_mm_per_min)) }
                             td.n { (grouped(p.lines)) }
+                            td.n { (p.lines_per_s) }
                             td.n { (format!("{:.1}", p.cutting_mm / 1000.0)) }
+                            td.n { (format!("{:.1} %", 100.0 * p.air_mm / p.cutting_mm.max(1e-9))) }
                             td.n { (format!("{:.2}", p.deepest_mm)) }
                             td.n { (duration(p.time_s)) }
                         }
@@ -99,11 +102,11 @@ fn programs(data: &ReportData) -> Markup {
                 @if data.programs.len() > 1 {
                     tfoot {
                         tr {
-                            td colspan="5" { "Together" }
+                            td colspan="7" { "Together" }
                             td.n {
                                 (format!("{:.1}", data.programs.iter().map(|p| p.cutting_mm).sum::<f64>() / 1000.0))
                             }
-                            td {}
+                            td {} td {}
                             td.n { (duration(data.total_time_s())) }
                         }
                     }

@@ -1,6 +1,6 @@
 //! The text summary on the terminal.
 
-use super::data::{ReportData, duration, short};
+use super::data::{ReportData, duration, grouped, short};
 use std::fmt::Write as _;
 
 /// The job in about a dozen aligned lines for a terminal, ending with a line break. No colours.
@@ -25,8 +25,15 @@ pub fn summary(data: &ReportData) -> String {
     let width = data.programs.iter().map(|p| p.file.chars().count()).max().unwrap_or(0);
     for (k, p) in data.programs.iter().enumerate() {
         let key = if k == 0 { "programs" } else { "" };
-        let metres = p.cutting_mm / 1000.0;
-        let what = format!("{:<width$}  {metres:>7.1} m  {:>12}", p.file, duration(p.time_s));
+        let what = format!(
+            "{:<width$}  {:>7.1} m  {:>12}  {:>9} lines, up to {}/s, {} mm/min on average",
+            p.file,
+            p.cutting_mm / 1000.0,
+            duration(p.time_s),
+            grouped(p.lines),
+            p.lines_per_s,
+            grouped(p.reached_mm_per_min.round() as usize),
+        );
         add(key, what);
     }
     add("time", duration(data.total_time_s()));
@@ -78,8 +85,8 @@ mod tests {
 job       Lotus (lotus.svg) on Shapeoko 3
 stock     160 x 160 x 20 mm beech, zero: lower-left corner, top of the stock
 relief    9 mm deep, 2 layers, nodes every 0.1 mm
-programs  1-rough-flat-6.nc      18.4 m   12 min 30 s
-          2-finish-ball-3.nc     61.3 m    1 h 05 min
+programs  1-rough-flat-6.nc      18.4 m   12 min 30 s     48 213 lines, up to 63/s, 1 104 mm/min on average
+          2-finish-ball-3.nc     61.3 m    1 h 05 min     48 213 lines, up to 63/s, 1 104 mm/min on average
 time      1 h 18 min
 leftover  0.002 / 0.006 / 0.011 / 0.412 mm (p50 / p90 / p99 / max) everywhere
 note      artwork in pixels: its longer side became 150 mm

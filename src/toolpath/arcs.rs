@@ -231,5 +231,4 @@ fn circumcenter(a: DVec2, b: DVec2, c: DVec2) -> Option<DVec2> {
 }
 
 #[cfg(test)]
-#[path = "arcs_tests.rs"]
 mod tests;
