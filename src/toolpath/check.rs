@@ -2,7 +2,7 @@
 
 use super::Toolpath;
 use crate::geom::{DVec3, Move, MoveKind};
-use crate::job::Job;
+use crate::job::{Job, Operation};
 
 /// A law that a toolpath breaks. Moves are counted from 0.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -123,8 +123,9 @@ const GRID_MM: f64 = 0.0011;
 impl Toolpath {
     /// Checks the laws of every toolpath: moves are continuous and finite, start and end at safe Z, stay above the
     /// stock's rectangle and within the machine's travel; rapids are vertical, level or at safe Z; feeds are
-    /// positive and go down no faster than the plunge limit of the operations that use this cutter; arcs are made of feed
-    /// moves at one speed, one after the other.
+    /// positive and go down no faster than the plunge limit of the operations that use this cutter, except straight down
+    /// from a rapid to below the top of the stock, at the feed of those operations: a descent in a hollow carved before
+    /// (that it meets no wood is for the dry run to prove); arcs are made of feed moves at one speed, one after the other.
     ///
     /// # Errors
     /// The first [`PathFault`] found.
@@ -148,7 +149,12 @@ impl Toolpath {
             }
             free_from = arc.moves.end;
         }
-        let plunge = self.plunge_limit(job);
+        let limit = |of: fn(&Operation) -> f64| {
+            let own = job.operations.iter().filter(|o| o.cutter == self.cutter);
+            own.map(of).fold(0.0, f64::max)
+        };
+        let plunge = limit(|o| o.plunge_mm_per_min);
+        let descent = plunge.max(limit(|o| o.feed_mm_per_min));
         let (mut low, mut high) = (first.from, first.from);
         let mut at = first.from;
         for (index, m) in self.moves.iter().enumerate() {
@@ -158,7 +164,11 @@ impl Toolpath {
             if m.from != at {
                 return Err(PathFault::Gap { name: name(), index, gap_mm: m.from.distance(at) });
             }
-            self.check_move(job, index, m, plunge)?;
+            let is_descent = index > 0
+                && self.moves[index - 1].is_rapid()
+                && m.from.truncate() == m.to.truncate()
+                && m.to.z < 0.0;
+            self.check_move(job, index, m, if is_descent { descent } else { plunge })?;
             at = m.to;
             (low, high) = (low.min(at), high.max(at));
         }
@@ -170,15 +180,6 @@ impl Toolpath {
             }
         }
         Ok(())
-    }
-
-    /// The highest plunge limit among the operations that use this cutter, mm/min.
-    fn plunge_limit(&self, job: &Job) -> f64 {
-        job.operations
-            .iter()
-            .filter(|o| o.cutter == self.cutter)
-            .map(|o| o.plunge_mm_per_min)
-            .fold(0.0, f64::max)
     }
 
     fn check_move(&self, job: &Job, index: usize, m: &Move, plunge: f64) -> Result<(), PathFault> {

@@ -4,7 +4,7 @@ use super::Site;
 use super::arcs::{Arc, Fitter};
 use super::ramp::ramp_onto;
 use super::trace::{DROP_MM, LEAST_ROUNDING_MM};
-use super::travel::{RAMP_GAP_MM, Travel};
+use super::travel::{CARVED_MM, RAMP_GAP_MM, Travel};
 use crate::cutter::Profile;
 use crate::geom::{DVec3, Move, MoveKind};
 use crate::job::{Job, Machine, Operation, OperationKind};
@@ -13,7 +13,7 @@ use crate::stock::{Block, Contact};
 use std::collections::VecDeque;
 
 /// A feed is set by the wood that is met within this distance before and after, mm.
-const NEARBY_MM: f64 = 2.0;
+const NEARBY_MM: f64 = 1.0;
 
 /// Three decimals, z rounded up: the program's text holds exactly what was planned.
 pub(super) fn on_program_grid(p: DVec3) -> DVec3 {
@@ -142,6 +142,15 @@ impl<'a> Emitter<'a> {
                 feed(m.to - m.from, most, self.operation, &self.job.machine)
             });
         let mut speeds: Vec<f64> = speeds.collect();
+        for k in 1..moves.len() {
+            let (before, m) = (&moves[k - 1], &moves[k]);
+            // The way down to a ramp, in a hollow that was carved before: its depth is known, and it meets nothing.
+            let is_straight_down = m.from.truncate() == m.to.truncate() && m.to.z < m.from.z;
+            let is_descent = before.is_rapid() && is_straight_down && m.to.z < -CARVED_MM;
+            if is_descent && contacts[k].deepest_mm == 0.0 {
+                speeds[k] = base.min(self.job.machine.max_rate_mm_per_min.z);
+            }
+        }
         for arc in &self.arcs[first_arc..] {
             let chords = &mut speeds[arc.moves.start - first..arc.moves.end - first];
             let slowest = chords.iter().copied().fold(f64::INFINITY, f64::min);

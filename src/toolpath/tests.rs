@@ -671,6 +671,22 @@ fn broken_paths_are_found_out() {
     }
     assert!(matches!(broken(&|m| m[down].kind = feed(5000.0)), PathFault::Plunge { .. }));
     assert!(matches!(broken(&|m| m[down].kind = feed(0.0)), PathFault::BadFeed { .. }));
+    // Straight down after a rapid, the operation's feed is allowed in a hollow, not at the top of the stock.
+    let (fast, plunge) = (job.operations[0].feed_mm_per_min, job.operations[0].plunge_mm_per_min);
+    assert!(good.moves[down - 1].is_rapid() && fast > plunge);
+    let descent = |end: f64, speed: f64| {
+        let mut path = good.clone();
+        (path.moves[down].to.z, path.moves[down + 1].from.z) = (end, end);
+        path.moves[down].kind = feed(speed);
+        path.moves[down + 1].kind = feed(plunge);
+        path.check(&job)
+    };
+    assert_eq!(descent(-1.0, fast), Ok(()));
+    for (end, speed) in [(-1.0, fast * 1.01), (0.0, fast), (0.1, plunge * 1.01)] {
+        assert!(
+            matches!(descent(end, speed), Err(PathFault::Plunge { index, .. }) if index == down)
+        );
+    }
     assert!(matches!(
         broken(&|m| m[slanted].kind = crate::geom::MoveKind::Rapid),
         PathFault::LowRapid { .. }

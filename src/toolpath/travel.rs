@@ -14,7 +14,7 @@ use crate::stock::Block;
 /// Gap above the wood where a ramp begins; down to it the cutter feeds straight through air, mm.
 pub(super) const RAMP_GAP_MM: f64 = 0.2;
 /// Ground counts as carved where the wood stands at least this far below the stock's top, mm.
-const CARVED_MM: f64 = 0.02;
+pub(super) const CARVED_MM: f64 = 0.02;
 /// Room beside the cutter on its way, mm.
 const BESIDE_MM: f64 = 0.5;
 /// A travel that saves less than this against safe Z goes at safe Z, mm.
