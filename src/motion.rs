@@ -46,8 +46,12 @@ impl Times {
 #[derive(Debug, Clone)]
 pub struct Planner {
     ring: Ring,
-    /// The line of each block in the ring.
-    lines: VecDeque<u32>,
+    /// The line of each block in the ring, and which move pushed it.
+    marks: VecDeque<(u32, usize)>,
+    /// Moves pushed so far.
+    pushed: usize,
+    /// Time of each move, s, where it is kept.
+    by_move: Option<Vec<f64>>,
     gauge: Gauge,
     /// Settled entry speed of the oldest block, squared.
     entry2: f64,
@@ -64,7 +68,9 @@ impl Planner {
     pub fn new(machine: &Machine) -> Self {
         Self {
             ring: Ring::new(Limits::from(machine)),
-            lines: VecDeque::new(),
+            marks: VecDeque::new(),
+            pushed: 0,
+            by_move: None,
             gauge: Gauge::default(),
             entry2: 0.0,
             times: Times::default(),
@@ -79,6 +85,12 @@ impl Planner {
         Self { supply: Some(Supply::new(baud)), ..Self::new(machine) }
     }
 
+    /// Keeps the time of each move, too.
+    #[must_use]
+    pub fn recording(self) -> Self {
+        Self { by_move: Some(Vec::new()), ..self }
+    }
+
     /// The next line of the program, with this many bytes (its end included), comes before what follows.
     pub fn line(&mut self, bytes: usize) {
         let now_s = self.clock_s();
@@ -91,6 +103,11 @@ impl Planner {
 
     /// Adds a move; the oldest block leaves when the ring is full.
     pub fn push(&mut self, mv: &Move) {
+        let number = self.pushed;
+        self.pushed += 1;
+        if let Some(seconds) = &mut self.by_move {
+            seconds.push(0.0);
+        }
         if !(mv.from.is_finite() && mv.to.is_finite()) {
             return;
         }
@@ -102,7 +119,7 @@ impl Planner {
         };
         let steps = std::array::from_fn(|k| to[k] - from[k]);
         if self.ring.push(steps, pace) {
-            self.lines.push_back(mv.line);
+            self.marks.push_back((mv.line, number));
             if self.ring.is_full() {
                 self.settle_oldest();
             }
@@ -126,6 +143,12 @@ impl Planner {
     /// Where the time of all settled blocks went; everything pushed is settled after [`Planner::sync`].
     pub fn times(&self) -> Times {
         self.times
+    }
+
+    /// The time of each move pushed, in their order, s: 0 for those not settled yet. Empty without
+    /// [`Planner::recording`].
+    pub fn seconds_by_move(&self) -> &[f64] {
+        self.by_move.as_deref().unwrap_or_default()
     }
 
     /// What all settled blocks ask of the controller, and what speeds they reach.
@@ -165,12 +188,17 @@ impl Planner {
     /// Fixes the exit speed of the oldest block with all the ring knows, adds its time and lets it go.
     fn settle_oldest(&mut self) {
         let exit2 = self.ring.front().map_or(0.0, |b| self.ring.exit2(self.entry2, b.length));
-        let (Some(block), Some(line)) = (self.ring.pop(), self.lines.pop_front()) else { return };
+        let (Some(block), Some((line, number))) = (self.ring.pop(), self.marks.pop_front()) else {
+            return;
+        };
         let seconds = trapezoid_s(&block, self.entry2, exit2);
         if block.is_rapid() {
             self.times.rapid_s += seconds;
         } else {
             self.times.feed_s += seconds;
+        }
+        if let Some(by_move) = &mut self.by_move {
+            by_move[number] = seconds;
         }
         self.entry2 = exit2;
         self.gauge.ends(&block, line, self.clock_s(), seconds);

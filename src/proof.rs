@@ -84,6 +84,8 @@ pub struct ProgramReport {
     pub cutting_mm: f64,
     /// Length of the feed moves that meet no wood, mm.
     pub air_mm: f64,
+    /// Time of the feed moves that meet no wood, s; part of `times.feed_s`.
+    pub air_s: f64,
     /// How often the program lifts to the safe height or lower and comes down again.
     pub retracts: usize,
     /// Length of the rapids, mm.

@@ -153,6 +153,9 @@ fn report_data(carving: &Carving) -> ReportData {
                 reached_mm_per_min: p.flow.reached_mm_per_min,
                 cutting_mm: p.cutting_mm,
                 air_mm: p.air_mm,
+                air_s: p.air_s,
+                rapid_s: p.times.rapid_s,
+                retracts: p.retracts,
                 deepest_mm: p.lowest_mm,
                 time_s: p.seconds,
             })

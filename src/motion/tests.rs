@@ -47,6 +47,23 @@ fn the_slowest_axis_rules() {
     assert!((seconds(&[m], &machine()) - want).abs() < 1e-9);
 }
 
+/// A move too short for a step takes none of the time.
+#[test]
+fn the_times_of_the_moves_are_the_time_of_the_whole() {
+    let at = |k: usize| DVec3::new((k * k) as f64 * 0.3, (k % 3) as f64, -0.1 * k as f64);
+    let mut moves: Vec<Move> = (0..40).map(|k| feed(at(k), at(k + 1), 1200.0)).collect();
+    moves.insert(20, feed(at(20), at(20) + DVec3::X * 1e-5, 1200.0));
+    moves[7].kind = MoveKind::Rapid;
+    let mut planner = Planner::new(&machine()).recording();
+    moves.iter().for_each(|m| planner.push(m));
+    planner.sync();
+    let by_move = planner.seconds_by_move();
+    assert_eq!((by_move.len(), by_move[20]), (moves.len(), 0.0));
+    assert!((by_move[7] - planner.times().rapid_s).abs() < 1e-12);
+    let feeds = by_move.iter().sum::<f64>() - by_move[7];
+    assert!((feeds - planner.times().feed_s).abs() < 1e-9);
+}
+
 #[test]
 fn a_straight_line_in_pieces_takes_the_time_of_the_whole() {
     let whole = feed(DVec3::ZERO, DVec3::X * 100.0, 1800.0);

@@ -6,14 +6,19 @@ use crate::cutter::Profile;
 use crate::gcode::read::{self, EventKind, Program};
 use crate::geom::{Bounds, DVec2, DVec3, Grid, Heightfield, Move, MoveKind};
 use crate::job::{CutterSpec, Job, Operation};
-use crate::motion::{Flow, Planner, Times};
+use crate::motion::Planner;
 use crate::stock::{Block, Contact};
+use std::ops::Range;
 
 /// Less wood than this removed by moves with one fault is a touch, not a cut, mm.
 const IN_WOOD_MM: f64 = 0.01;
 
-/// A feed move that removes less than this is an air cut, mm.
+/// A feed move that removes less than this meets no wood, mm.
 const AIR_MM: f64 = 1e-4;
+
+/// Feed moves that meet no wood are air cuts where they are together longer than this, in distances of the nodes:
+/// between two nodes a move in wood finds none.
+const AIR_RUN_NODES: f64 = 2.0;
 
 /// A faultless move longer than this ends a run of faulty ones, mm.
 const RUN_BREAK_MM: f64 = 0.1;
@@ -151,21 +156,26 @@ impl Case<'_> {
             self.check_place(m);
         }
         self.check_spindle(&contacts);
-        let (times, flow) = self.times();
+        let planner = self.run_planner();
+        let (times, seconds) = (planner.times(), planner.seconds_by_move());
         let length = |rapid: bool| {
             moves.iter().filter(|m| m.is_rapid() == rapid).map(Move::length_mm).sum::<f64>()
         };
-        let pairs = moves.iter().zip(&contacts);
-        let air = pairs.filter(|(m, c)| !m.is_rapid() && f64::from(c.deepest_mm) <= AIR_MM);
+        let (mut air_mm, mut air_s) = (0.0, 0.0);
+        for run in air_runs(moves, &contacts, AIR_RUN_NODES * block.field().grid().pitch_mm) {
+            air_mm += moves[run.clone()].iter().map(Move::length_mm).sum::<f64>();
+            air_s += seconds[run].iter().sum::<f64>();
+        }
         ProgramReport {
             name: self.text.name.to_owned(),
             lines: self.program.lines,
             moves: moves.len(),
             times,
-            flow,
+            flow: planner.flow(),
             seconds: times.total_s(),
             cutting_mm: length(false),
-            air_mm: air.map(|(m, _)| m.length_mm()).sum(),
+            air_mm,
+            air_s,
             retracts: moves.windows(2).filter(|w| !w[0].is_rapid() && w[1].is_rapid()).count(),
             rapid_mm: length(true),
             lowest_mm: if moves.is_empty() { self.job.safe_z_mm } else { lowest_mm },
@@ -476,11 +486,21 @@ impl Case<'_> {
     }
 
     /// Time and flow by the model of the planner.
-    fn times(&self) -> (Times, Flow) {
-        let mut planner = Planner::new(&self.job.machine);
+    fn run_planner(&self) -> Planner {
+        let mut planner = Planner::new(&self.job.machine).recording();
         time::run(self.program, &[], &mut planner);
-        (planner.times(), planner.flow())
+        planner
     }
+}
+
+/// The runs of feed moves, longer than `longer_than_mm` together, that meet no wood.
+fn air_runs(moves: &[Move], contacts: &[Contact], longer_than_mm: f64) -> Vec<Range<usize>> {
+    let is_air = |k: usize| !moves[k].is_rapid() && f64::from(contacts[k].deepest_mm) <= AIR_MM;
+    let all: Vec<usize> = (0..moves.len()).collect();
+    let runs = all.chunk_by(|&a, &b| is_air(a) == is_air(b)).filter(|run| is_air(run[0]));
+    runs.map(|run| run[0]..run[0] + run.len())
+        .filter(|run| moves[run.clone()].iter().map(Move::length_mm).sum::<f64>() > longer_than_mm)
+        .collect()
 }
 
 /// Distance in plan of a move from a rectangle, mm; 0 where they meet.

@@ -293,6 +293,11 @@ fn feed_and_speed_are_held_to_the_cutters_own_operations() {
     let mut air = CLEAN.to_vec();
     air.insert(5, "G1 Z1 F2000");
     let v = verdict(&flat_job(), &air).unwrap();
+    // 4 mm at 2000 mm/min, and a little for getting there.
+    let (r, at_speed_s) = (&v.programs[0], 4.0 / 2000.0 * 60.0);
+    assert_eq!(r.air_mm, 4.0);
+    assert!((at_speed_s..2.0 * at_speed_s).contains(&r.air_s), "{}", r.air_s);
+    assert_eq!(verdict(&flat_job(), &CLEAN).unwrap().programs[0].air_mm, 0.0);
     assert!(v.passed(), "{:#?}", v.failures);
 }
 

@@ -107,6 +107,12 @@ pub struct ProgramRow {
     pub cutting_mm: f64,
     /// Length of those that meet no wood, mm.
     pub air_mm: f64,
+    /// Time of those that meet no wood, s.
+    pub air_s: f64,
+    /// Time of the rapids, s.
+    pub rapid_s: f64,
+    /// How often the tool is lifted.
+    pub retracts: usize,
     /// Lowest Z it goes to, mm.
     pub deepest_mm: f64,
     /// Time by the model of the controller's planner, s.
@@ -150,6 +156,13 @@ pub struct Picture {
     pub png: Vec<u8>,
 }
 
+impl ProgramRow {
+    /// The part of its time in which it cuts no wood: rapids, and feed moves in air.
+    pub(super) fn idle_part(&self) -> f64 {
+        if self.time_s > 0.0 { (self.air_s + self.rapid_s) / self.time_s } else { 0.0 }
+    }
+}
+
 impl ReportData {
     /// Time of all programs, s.
     pub fn total_time_s(&self) -> f64 {
@@ -171,6 +184,11 @@ pub(super) fn duration(seconds: f64) -> String {
             format!("{} h {:02} min", minutes / 60, minutes % 60)
         }
     }
+}
+
+/// A part in percent with one decimal: `6.9 %`.
+pub(super) fn percent(part: f64) -> String {
+    format!("{:.1} %", 100.0 * part)
 }
 
 /// A length without needless zeros, at most three decimals: `160`, `0.1`, `3.175`.
@@ -225,6 +243,9 @@ pub(super) mod tests {
             lines_per_s: 63,
             reached_mm_per_min: 1104.0,
             air_mm: 0.02 * cutting_mm,
+            air_s: 0.02 * time_s,
+            rapid_s: 0.03 * time_s,
+            retracts: 41,
             cutting_mm,
             deepest_mm: -9.0,
             time_s,

@@ -1,6 +1,6 @@
 //! The report as one HTML file that needs nothing else: pictures and style are inside it.
 
-use super::data::{Picture, ReportData, duration, grouped, short};
+use super::data::{Picture, ReportData, duration, grouped, percent, short};
 use maud::{DOCTYPE, Markup, PreEscaped, html as markup};
 
 const STYLE: &str = include_str!("report.css");
@@ -80,7 +80,8 @@ fn programs(data: &ReportData) -> Markup {
                     tr {
                         th { "File" } th { "Cutter" }
                         th.n { "Spindle, 1/min" } th.n { "Feed, mm/min" } th.n { "reached" } th.n { "Lines" }
-                        th.n { "at most, 1/s" } th.n { "Cutting, m" } th.n { "in air" } th.n { "Deepest, mm" } th.n { "Time" }
+                        th.n { "at most, 1/s" } th.n { "Cutting, m" } th.n { "Retracts" } th.n { "Deepest, mm" }
+                        th.n { "Air and rapids" } th.n { "Time" }
                     }
                 }
                 tbody {
@@ -93,8 +94,9 @@ fn programs(data: &ReportData) -> Markup {
                             td.n { (grouped(p.lines)) }
                             td.n { (p.lines_per_s) }
                             td.n { (format!("{:.1}", p.cutting_mm / 1000.0)) }
-                            td.n { (format!("{:.1} %", 100.0 * p.air_mm / p.cutting_mm.max(1e-9))) }
+                            td.n { (grouped(p.retracts)) }
                             td.n { (format!("{:.2}", p.deepest_mm)) }
+                            td.n { (percent(p.idle_part())) }
                             td.n { (duration(p.time_s)) }
                         }
                     }
@@ -106,7 +108,7 @@ fn programs(data: &ReportData) -> Markup {
                             td.n {
                                 (format!("{:.1}", data.programs.iter().map(|p| p.cutting_mm).sum::<f64>() / 1000.0))
                             }
-                            td {} td {}
+                            td {} td {} td {}
                             td.n { (duration(data.total_time_s())) }
                         }
                     }

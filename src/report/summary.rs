@@ -1,6 +1,6 @@
 //! The text summary on the terminal.
 
-use super::data::{ReportData, duration, grouped, short};
+use super::data::{ReportData, duration, grouped, percent, short};
 use std::fmt::Write as _;
 
 /// The job in about a dozen aligned lines for a terminal, ending with a line break. No colours.
@@ -26,10 +26,11 @@ pub fn summary(data: &ReportData) -> String {
     for (k, p) in data.programs.iter().enumerate() {
         let key = if k == 0 { "programs" } else { "" };
         let what = format!(
-            "{:<width$}  {:>7.1} m  {:>12}  {:>9} lines, up to {}/s, {} mm/min on average",
+            "{:<width$}  {:>7.1} m  {:>12}, {} in air  {:>9} lines, up to {}/s, {} mm/min on average",
             p.file,
             p.cutting_mm / 1000.0,
             duration(p.time_s),
+            percent(p.idle_part()),
             grouped(p.lines),
             p.lines_per_s,
             grouped(p.reached_mm_per_min.round() as usize),
@@ -85,8 +86,8 @@ mod tests {
 job       Lotus (lotus.svg) on Shapeoko 3
 stock     160 x 160 x 20 mm beech, zero: lower-left corner, top of the stock
 relief    9 mm deep, 2 layers, nodes every 0.1 mm
-programs  1-rough-flat-6.nc      18.4 m   12 min 30 s     48 213 lines, up to 63/s, 1 104 mm/min on average
-          2-finish-ball-3.nc     61.3 m    1 h 05 min     48 213 lines, up to 63/s, 1 104 mm/min on average
+programs  1-rough-flat-6.nc      18.4 m   12 min 30 s, 5.0 % in air     48 213 lines, up to 63/s, 1 104 mm/min on average
+          2-finish-ball-3.nc     61.3 m    1 h 05 min, 5.0 % in air     48 213 lines, up to 63/s, 1 104 mm/min on average
 time      1 h 18 min
 leftover  0.002 / 0.006 / 0.011 / 0.412 mm (p50 / p90 / p99 / max) everywhere
 note      artwork in pixels: its longer side became 150 mm
