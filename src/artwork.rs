@@ -1,15 +1,18 @@
-//! SVG bytes -> curves by layer, closed or open, every one resolved or refused.
+//! SVG or bitmap bytes -> curves by layer, closed or open, every one resolved or refused.
 //!
 //! ```text
 //!   bytes --source--> checked XML, every element named --read--> Shapes in paint order --place--> mm, by layer
+//!   bytes --bitmap--> a palette and patches of its colours ------> the same Shapes
 //! ```
 //!
+//! [`read_bitmap`] turns PNG and JPEG into shapes, one for each patch of a colour.
 //! [`read_svg`] checks the whole document first (size, numbers, references, nesting), then lets `usvg`
 //! resolve styles, `use`, transforms and text, and maps each painted thing back to its element, so that
 //! messages can name it and layers can select it by the label that Inkscape gave it. What cannot be carved
 //! is an error or a note with a name, never dropped in silence. No files are opened here: fonts come in
 //! as [`Fonts`], and references to other files are refused.
 
+mod bitmap;
 pub(crate) mod boolean;
 mod clip;
 mod colour_name;
@@ -21,6 +24,7 @@ mod source;
 mod stroke;
 mod values;
 
+pub use bitmap::{Picture, Swatch, is_picture, read_bitmap};
 pub use read::read_svg;
 
 use std::sync::Arc;
@@ -107,6 +111,8 @@ pub struct Artwork {
     pub shapes: Vec<Shape>,
     /// Millimetres a unit of the file (a CSS pixel), when the file gives physical sizes; `None` for pixel art.
     pub unit_mm: Option<f64>,
+    /// Size and palette, when it is a picture of pixels.
+    pub picture: Option<Picture>,
     /// What was found odd, for the user.
     pub notes: Vec<String>,
 }
@@ -330,6 +336,54 @@ pub enum ArtworkError {
     Unreadable {
         /// What it says.
         reason: String,
+    },
+    /// Bytes that are no picture.
+    #[error(
+        "the file is neither PNG nor JPEG, whatever its name says: {begins}; export the artwork as PNG (or as SVG)"
+    )]
+    NotPicture {
+        /// What it is or begins with.
+        begins: String,
+    },
+    /// A picture that does not decode.
+    #[error("the {kind} is damaged or cut short: {reason}; copy or export it again")]
+    BrokenPicture {
+        /// `PNG` or `JPEG`.
+        kind: &'static str,
+        /// What the decoder says.
+        reason: String,
+    },
+    /// A picture of no size.
+    #[error("the picture has no pixels ({width} x {height}); export it again")]
+    NoPixels {
+        /// Pixels in a row.
+        width: usize,
+        /// Rows.
+        height: usize,
+    },
+    /// More pixels than the program takes on.
+    #[error(
+        "the picture has {width} x {height} pixels, at most {limit} are read; scale it down: 4000 on the longer side \
+         are more than a router can cut"
+    )]
+    TooManyPixels {
+        /// Pixels in a row.
+        width: usize,
+        /// Rows.
+        height: usize,
+        /// How many are read.
+        limit: usize,
+    },
+    /// More patches than anybody would carve.
+    #[error(
+        "the picture falls into {patches} patches of colour, at most {limit} are carved: it is a photo or noisy; raise \
+         artwork.trace.least_area_px, lower artwork.trace.colors, or reduce its colours in a paint program"
+    )]
+    Speckled {
+        /// How many there are.
+        patches: usize,
+        /// How many are taken.
+        limit: usize,
     },
     /// Nothing with an area.
     #[error("the artwork holds nothing that can be carved: no filled or stroked shape{}", because(.notes))]

@@ -14,6 +14,7 @@
 
 pub mod arc;
 mod distance;
+pub(crate) mod edge_grid;
 mod heightfield;
 mod moves;
 mod polygon;

@@ -24,9 +24,9 @@ pub use draft::Draft;
 pub use error::{Fault, JobError};
 pub use library::{BUILT_IN_FILES, Library};
 pub use types::{
-    ArtworkSpec, Background, Combine, CrestSpec, CutterShape, CutterSpec, Fit, Follow, Found,
-    FoundLayer, Job, Join, KeepOut, LayerSpec, Machine, Milling, Operation, OperationKind, Origin,
-    Pattern, Place, Profile, Prune, ReliefSpec, Rgb, Selector, Significance, SkeletonSpec, Split,
-    Stepover, Stock, SurfaceSpec, Within, Wood,
+    ArtworkSpec, Backdrop, Background, Combine, Connectivity, CrestSpec, CutterShape, CutterSpec,
+    Fit, Follow, Found, FoundLayer, Job, Join, KeepOut, LayerSpec, Machine, Milling, Operation,
+    OperationKind, Origin, Pattern, Place, Profile, Prune, ReliefSpec, Rgb, Selector, Significance,
+    SkeletonSpec, Split, Stepover, Stock, SurfaceSpec, TraceMethod, TraceSpec, Within, Wood,
 };
 pub use write::{defaults_table, template};

@@ -11,7 +11,7 @@
 //! | `geom` | points, bounds, exact orientation, polygons, arcs, plain moves, `Heightfield` (the grid itself), `Tolerance` | - |
 //! | `job` | design TOML + machine, cutter and wood tables -> a checked `Job`; every default in one table | geom |
 //! | `cutter` | cutter shapes: height of the profile at a radius, tip, flank, shank, holder | geom job |
-//! | `artwork` | SVG bytes -> curves by layer, closed or open, every one resolved or refused | geom job |
+//! | `artwork` | SVG or bitmap bytes -> curves by layer, closed or open, every one resolved or refused | geom job |
 //! | `outline` | curves -> `Region`s (outer ring + holes): flatten, resolve, orient, nest | geom job artwork |
 //! | `skeleton` | `Region` -> resampled rings, constrained Delaunay triangles, classes T/S/J, cells, runs, spine | geom job outline |
 //! | `surface` | region + cells + layer settings -> `Mesh` or height field; one file per method | geom job outline skeleton |

@@ -10,7 +10,6 @@
 //! leaves here passes [`Region::check`]. What was changed is said in the notes; nothing is dropped in silence.
 
 mod check;
-mod edge_grid;
 mod notes;
 mod regions;
 mod trace;

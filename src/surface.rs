@@ -116,6 +116,15 @@ pub enum Remark {
         /// Why.
         why: RuledFault,
     },
+    /// Its outline is rough: many of the ends of its spine are ripples much smaller than itself.
+    Rough {
+        /// How many ripples.
+        ripples: usize,
+        /// Their mean length along the outline, mm.
+        length_mm: f64,
+        /// The middle of its bounding box, mm.
+        at: crate::geom::DVec2,
+    },
     /// The ridge was asked to lie below the outline; it lies level with it.
     RidgeBelowBase,
     /// It reaches past the edge of the stock and is cut off there.
@@ -208,6 +217,7 @@ pub fn raise_all(
     let mut notes = Vec::new();
     for (layer, remarks) in layers.iter().zip(&remarks) {
         tell(layer, remarks, grid.pitch_mm, &mut notes);
+        notes.extend(tell_rough(&layer.name, remarks));
     }
     Ok(Raised { surfaces, notes })
 }
@@ -261,7 +271,6 @@ fn tell(layer: &LayerSpec, remarks: &[(&str, Remark)], pitch_mm: f64, notes: &mu
     let mut over: Option<(usize, f64, &str)> = None;
     let mut lost: Option<(usize, &str, crate::geom::DVec2, SkeletonError)> = None;
     let mut fell_back: Option<(usize, &str, crate::geom::DVec2, RuledFault)> = None;
-    let mut below_base = false;
     for &(source, remark) in remarks {
         match remark {
             Remark::Narrow { width_mm, at } | Remark::TooNarrow { width_mm, at } => {
@@ -298,7 +307,7 @@ fn tell(layer: &LayerSpec, remarks: &[(&str, Remark)], pitch_mm: f64, notes: &mu
                 let seen = fell_back.get_or_insert((0, source, at, why));
                 seen.0 += 1;
             }
-            Remark::RidgeBelowBase => below_base = true,
+            Remark::Rough { .. } | Remark::RidgeBelowBase => {}
         }
     }
     if let Some((n, width, source, at)) = too_narrow {
@@ -348,12 +357,31 @@ fn tell(layer: &LayerSpec, remarks: &[(&str, Remark)], pitch_mm: f64, notes: &mu
             at.x, at.y
         ));
     }
-    if below_base {
+    if remarks.iter().any(|(_, remark)| *remark == Remark::RidgeBelowBase) {
         notes.push(format!(
             "layer '{name}': height_mm = {} lies below base_mm = {}; the layer is flat at base_mm",
             layer.height_mm, layer.base_mm
         ));
     }
+}
+
+/// The note on rough outlines: how many, and the one with the most ripples.
+fn tell_rough(name: &str, remarks: &[(&str, Remark)]) -> Option<String> {
+    let rough = remarks.iter().filter_map(|&(source, remark)| match remark {
+        Remark::Rough { ripples, length_mm, at } => Some((ripples, length_mm, source, at)),
+        _ => None,
+    });
+    let rough: Vec<_> = rough.collect();
+    let worst = rough.iter().rev().max_by_key(|one| one.0)?;
+    let (ripples, length, source, at) = *worst;
+    Some(format!(
+        "layer '{name}': the outline of {} part(s) is rough, and its ripples end up in the crest; the worst has {ripples} \
+         of them, about {length:.2} mm long ({source}, at {:.1}, {:.1}); where they are not meant, smooth the path, or \
+         in a picture raise artwork.trace.smooth_px to about their length in pixels",
+        rough.len(),
+        at.x,
+        at.y
+    ))
 }
 
 #[cfg(test)]

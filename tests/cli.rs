@@ -234,6 +234,156 @@ fn new_writes_a_job_that_checks_and_never_overwrites() {
     assert!(stderr(&again).contains("leaf.toml"), "{}", stderr(&again));
 }
 
+/// A picture of `w` x `h` pixels, rows from the top.
+fn png(w: u32, h: u32, color: &dyn Fn(f64, f64) -> [u8; 3]) -> Vec<u8> {
+    let at = |k: u32| color(f64::from(k % w) + 0.5, f64::from(h - k / w) - 0.5);
+    let data: Vec<u8> = (0..w * h).flat_map(at).collect();
+    let mut bytes = Vec::new();
+    let mut encoder = png::Encoder::new(&mut bytes, w, h);
+    encoder.set_color(png::ColorType::Rgb);
+    encoder.set_depth(png::BitDepth::Eight);
+    encoder.write_header().unwrap().write_image_data(&data).unwrap();
+    bytes
+}
+
+/// A green disc with a yellow one in it, on white.
+fn disc(x: f64, y: f64) -> [u8; 3] {
+    match libm::hypot(x - 60.0, y - 50.0) {
+        r if r < 15.0 => [240, 200, 40],
+        r if r < 40.0 => [40, 127, 63],
+        _ => [255, 255, 255],
+    }
+}
+
+fn pattern() -> Vec<u8> {
+    png(120, 100, &disc)
+}
+
+/// The palette of [`pattern`], counted pixel by pixel.
+fn palette() -> [String; 3] {
+    let all: Vec<[u8; 3]> =
+        (0..12_000).map(|k| disc(f64::from(k % 120) + 0.5, f64::from(k / 120) + 0.5)).collect();
+    let swatch = |color: [u8; 3], name: &str| {
+        let share = all.iter().filter(|c| **c == color).count() as f64 / 120.0;
+        let [r, g, b] = color;
+        format!("#{r:02x}{g:02x}{b:02x} {name} {share:.1} %")
+    };
+    [
+        swatch([40, 127, 63], "green"),
+        swatch([240, 200, 40], "yellow"),
+        swatch([255, 255, 255], "white") + " (backdrop)",
+    ]
+}
+
+#[test]
+fn a_picture_is_carved_with_defaults() {
+    let desk = Desk::new();
+    desk.put("pattern.png", pattern());
+    let out = desk.run(&["carve", "pattern.png"]);
+    assert_eq!(out.status.code(), Some(0), "{}", stderr(&out));
+    let said = String::from_utf8_lossy(&out.stdout);
+    for word in ["150 mm", "3 colours"].map(str::to_owned).iter().chain(&palette()) {
+        assert!(said.contains(word), "'{word}' in {said}");
+    }
+    let files = desk.files();
+    for name in ["1-rough-flat-6.nc", "2-finish-ball-3.nc", "relief.png", "job.toml"] {
+        assert!(files.contains_key(&format!("pattern-carving/{name}")), "{name}");
+    }
+}
+
+#[test]
+fn a_picture_gets_a_job_with_its_palette() {
+    let desk = Desk::new();
+    desk.put("pattern.png", pattern());
+    let out = desk.run(&["new", "pattern.png"]);
+    assert_eq!(out.status.code(), Some(0), "{}", stderr(&out));
+    for word in &palette() {
+        assert!(stderr(&out).contains(word), "'{word}' in {}", stderr(&out));
+    }
+    let text = std::fs::read_to_string(desk.dir.path().join("pattern.toml")).unwrap();
+    for word in [
+        "select = \"fill:#287f3f\"",
+        "select = \"fill:#f0c828\"",
+        "[artwork.trace]",
+        "# backdrop = \"auto\"",
+    ] {
+        assert!(text.contains(word), "'{word}' in {text}");
+    }
+    let check = desk.run(&["check", "pattern.toml"]);
+    assert_eq!(check.status.code(), Some(0), "{}", stderr(&check));
+    assert!(stderr(&check).contains(&palette()[2]), "{}", stderr(&check));
+    let wrong = text.replace("fill:#f0c828", "fill:#f0c829");
+    desk.put("wrong.toml", wrong);
+    refused(&desk, &["check", "wrong.toml"], 1, &["fill:#f0c828", "did you mean"]);
+}
+
+/// An ellipse of 240 corners with 6 % of noise (appendix D of the specification), 20 px a unit.
+fn noisy() -> Vec<u8> {
+    let mut s = 12_345_u64;
+    let ring: Vec<(f64, f64)> = (0..240)
+        .map(|k| {
+            s = (1_103_515_245 * s + 12_345) % (1 << 31);
+            let r = 20.0 * (1.0 + 0.06 * (2.0 * s as f64 / (1_u64 << 31) as f64 - 1.0));
+            let t = std::f64::consts::TAU * f64::from(k) / 240.0;
+            (150.0 + r * 6.0 * libm::cos(t), 80.0 + r * 3.0 * libm::sin(t))
+        })
+        .collect();
+    let inside = |x: f64, y: f64| {
+        let edges = ring.iter().zip(ring.iter().cycle().skip(1));
+        let crossed = edges.filter(|((ax, ay), (bx, by))| {
+            (*ay > y) != (*by > y) && x < ax + (bx - ax) * (y - ay) / (by - ay)
+        });
+        crossed.count() % 2 == 1
+    };
+    png(300, 160, &|x, y| if inside(x, y) { [0, 0, 0] } else { [255, 255, 255] })
+}
+
+#[test]
+fn a_noisy_scan_warns_until_it_is_smoothed() {
+    let desk = Desk::new();
+    desk.put("noisy.png", noisy());
+    let job = |trace: &str| {
+        format!(
+            "[artwork]\nfile = \"noisy.png\"\nwidth_mm = 60\n{trace}\n[relief]\npitch_mm = 0.2\n"
+        )
+    };
+    desk.put("raw.toml", job(""));
+    let out = desk.run(&["check", "raw.toml"]);
+    assert_eq!(out.status.code(), Some(0), "{}", stderr(&out));
+    let said = stderr(&out);
+    assert!(said.contains("is rough") && said.contains("artwork.trace.smooth_px"), "{said}");
+    desk.put("smooth.toml", job("[artwork.trace]\nsmooth_px = 16\n"));
+    let out = desk.run(&["carve", "smooth.toml"]);
+    assert_eq!(out.status.code(), Some(0), "{}", stderr(&out));
+    let said = String::from_utf8_lossy(&out.stdout).into_owned() + &stderr(&out);
+    assert!(!said.contains("rough,"), "{said}");
+    // The resolved job repeats the run.
+    let again = desk.run(&["carve", "smooth-carving/job.toml", "--out", "again"]);
+    assert_eq!(again.status.code(), Some(0), "{}", stderr(&again));
+    let files = desk.files();
+    for name in ["1-rough-flat-6.nc", "2-finish-ball-3.nc", "depth.png", "relief.png"] {
+        assert!(
+            files[&format!("smooth-carving/{name}")] == files[&format!("again/{name}")],
+            "{name}"
+        );
+    }
+}
+
+#[test]
+fn pictures_that_are_none_are_refused() {
+    let desk = Desk::new();
+    desk.put("a.png", "no picture at all");
+    refused(&desk, &["carve", "a.png"], 1, &["a.png", "neither PNG nor JPEG", "export"]);
+    let whole = pattern();
+    desk.put("b.png", &whole[..whole.len() / 2]);
+    refused(&desk, &["carve", "b.png"], 1, &["b.png", "cut short", "again"]);
+    desk.put("c.gif", "GIF89a");
+    refused(&desk, &["carve", "c.gif"], 1, &["'.gif' files are not read", ".png"]);
+    desk.put("leaf.svg", LEAF);
+    desk.put("d.toml", "[artwork]\nfile = \"leaf.svg\"\ndpi = 300\n");
+    refused(&desk, &["carve", "d.toml"], 1, &["artwork.dpi", "leaf.svg is a drawing"]);
+}
+
 #[test]
 fn lists_name_what_there_is() {
     let desk = Desk::new();

@@ -18,6 +18,15 @@ fn name(sample: &Path) -> &str {
     sample.file_name().unwrap().to_str().unwrap()
 }
 
+/// The drawing or picture of a sample.
+fn artwork(sample: &Path) -> PathBuf {
+    let endings = ["svg", "png", "jpg"];
+    let all = endings.map(|e| sample.join(format!("{}.{e}", name(sample))));
+    let found: Vec<_> = all.into_iter().filter(|p| p.is_file()).collect();
+    assert_eq!(found.len(), 1, "{}: one file of artwork, svg, png or jpg", sample.display());
+    found[0].clone()
+}
+
 fn carve(sample: &Path) {
     let name = name(sample);
     let desk = tempfile::tempdir().unwrap();
@@ -28,8 +37,8 @@ fn carve(sample: &Path) {
         job.replace_range(at..end, "pitch_mm = 0.4");
     }
     std::fs::write(desk.path().join("job.toml"), job).unwrap();
-    std::fs::copy(sample.join(format!("{name}.svg")), desk.path().join(format!("{name}.svg")))
-        .unwrap();
+    let artwork = artwork(sample);
+    std::fs::copy(&artwork, desk.path().join(artwork.file_name().unwrap())).unwrap();
     let out = assert_cmd::Command::cargo_bin("relievo")
         .unwrap()
         .current_dir(desk.path())
@@ -44,13 +53,10 @@ fn carve(sample: &Path) {
 #[test]
 fn every_sample_has_artwork_licence_and_job() {
     let all = samples();
-    assert!(all.len() >= 4);
+    assert!(all.len() >= 5);
     for sample in all {
-        for file in [
-            format!("{}.svg", name(&sample)),
-            format!("{}.toml", name(&sample)),
-            "LICENCE.txt".into(),
-        ] {
+        artwork(&sample);
+        for file in [format!("{}.toml", name(&sample)), "LICENCE.txt".into()] {
             assert!(sample.join(&file).is_file(), "{}: {file}", sample.display());
         }
     }
@@ -69,6 +75,11 @@ fn celtic_square_carves() {
 #[test]
 fn cloud_carves() {
     carve(&samples().into_iter().find(|s| name(s) == "cloud").unwrap());
+}
+
+#[test]
+fn mountains_carve() {
+    carve(&samples().into_iter().find(|s| name(s) == "mountains").unwrap());
 }
 
 #[test]

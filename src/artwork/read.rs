@@ -69,7 +69,7 @@ pub fn read_svg(bytes: &[u8], fonts: &Fonts) -> Result<Artwork, ArtworkError> {
     if !walker.shapes.iter().any(Shape::is_carvable) {
         return Err(ArtworkError::Empty { notes });
     }
-    Ok(Artwork { shapes: walker.shapes, unit_mm: source.unit_mm, notes })
+    Ok(Artwork { shapes: walker.shapes, unit_mm: source.unit_mm, picture: None, notes })
 }
 
 /// What a node takes over from the groups it lies in.

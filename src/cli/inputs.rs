@@ -1,8 +1,8 @@
 //! A job file or bare artwork on the disk -> a checked draft and its artwork.
 
 use super::files;
-use crate::artwork::{Artwork, Fonts, read_svg};
-use crate::job::{Draft, Library};
+use crate::artwork::{Artwork, Fonts, is_picture, read_bitmap, read_svg};
+use crate::job::{ArtworkSpec, Draft, Library};
 use anyhow::{Context, Result, bail};
 use std::path::{Path, PathBuf};
 
@@ -16,7 +16,7 @@ pub(super) struct Input {
     pub(super) library: Library,
 }
 
-/// Reads a job file (`.toml`) or artwork (`.svg`, `.svgz`) and, for a job, the artwork it names.
+/// Reads a job file (`.toml`) or artwork (`.svg`, `.svgz`, `.png`, `.jpg`, `.jpeg`) and, for a job, the artwork it names.
 pub(super) fn load(path: &Path) -> Result<Input> {
     let beside = path.parent().unwrap_or(Path::new(""));
     let library = library(beside)?;
@@ -30,15 +30,18 @@ pub(super) fn load(path: &Path) -> Result<Input> {
             let file = beside.join(&draft.artwork().file);
             (draft, file)
         }
-        "svg" | "svgz" => {
+        known if known == "svg" || known == "svgz" || ArtworkSpec::PICTURES.contains(&known) => {
             let name = path.file_name().unwrap_or_default().to_string_lossy();
             (Draft::for_artwork(&name, &library), path.to_path_buf())
         }
         "" => {
-            bail!("{} has no extension; give a job file (.toml) or artwork (.svg)", path.display())
+            bail!(
+                "{} has no extension; give a job file (.toml) or artwork (.svg, .png, .jpg)",
+                path.display()
+            )
         }
         other => bail!(
-            "{}: '.{other}' files are not read; give a job file (.toml) or artwork (.svg, .svgz)",
+            "{}: '.{other}' files are not read; give a job file (.toml) or artwork (.svg, .svgz, .png, .jpg)",
             path.display()
         ),
     };
@@ -48,6 +51,13 @@ pub(super) fn load(path: &Path) -> Result<Input> {
         }
         bytes => bytes?,
     };
+    // What it is shows in its first bytes; its name counts when they say nothing.
+    if is_picture(&bytes) || draft.artwork().is_picture() {
+        let artwork = read_bitmap(&bytes, draft.artwork())
+            .with_context(|| artwork_file.display().to_string())?;
+        return Ok(Input { draft, artwork, artwork_file, library });
+    }
+    draft.refuse_picture_keys()?;
     let dirs: Vec<PathBuf> = draft.artwork().font_dirs.iter().map(|d| beside.join(d)).collect();
     if let Some(lost) = dirs.iter().find(|d| !d.is_dir()) {
         let message = format!("font folder {} is not there", lost.display());

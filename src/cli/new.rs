@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  relievo new rose.svg        writes rose.toml")]
 pub(super) struct Args {
-    /// The artwork (.svg, .svgz)
+    /// The artwork (.svg, .svgz, .png, .jpg)
     artwork: PathBuf,
 
     /// Where to write (default: beside the artwork, ART.toml)
@@ -23,7 +23,7 @@ pub(super) struct Args {
 pub(super) fn run(args: &Args) -> Result<(), Stop> {
     if args.artwork.extension().is_some_and(|e| e == "toml") {
         return Err(anyhow!(
-            "{} is a job file already; give artwork (.svg)",
+            "{} is a job file already; give artwork (.svg, .png, .jpg)",
             args.artwork.display()
         )
         .into());
@@ -35,6 +35,10 @@ pub(super) fn run(args: &Args) -> Result<(), Stop> {
     let text = job::template(&name, &input.artwork.found(), &input.library)?;
     write_new(&out, &text)?;
     if !args.quiet {
+        // The colours of a picture are found, not drawn: say which, and how much of each.
+        for note in input.artwork.notes.iter().filter(|_| input.artwork.picture.is_some()) {
+            observe::complain(&format!("note: {note}"));
+        }
         observe::say(&format!(
             "{} written; edit it, then: relievo carve {}",
             out.display(),

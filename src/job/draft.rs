@@ -7,13 +7,16 @@ use toml::de::{DeTable, DeValue};
 use super::error::{JobError, Source, shown};
 use super::keys::{
     ARTWORK, AT, BACKGROUND, KEEP_OUT, LAYER, MACHINE, OPERATION, RELIEF, SAFETY, STOCK, TOLERANCE,
-    TOP, WOOD, rule,
+    TOP, TRACE, TRACE_METHODS, WOOD, rule,
 };
-use super::layer::{LayerDraft, read_layer};
+use super::layer::{LayerDraft, read_color, read_layer};
 use super::library::{Library, read_machine, read_machine_file, read_wood};
 use super::operation::{OperationDraft, default_operations, read_operation};
 use super::reader::{Table, as_number};
-use super::types::{ArtworkSpec, Fit, KeepOut, Machine, Origin, Place, Wood};
+use super::types::{
+    ArtworkSpec, Backdrop, Connectivity, Fit, KeepOut, Machine, Origin, Place, TraceMethod,
+    TraceSpec, Wood,
+};
 use crate::geom::{DVec2, Tolerance};
 
 /// A checked job in which what hangs on the artwork is still open: sizes, stock, layers.
@@ -92,6 +95,8 @@ impl Draft {
             fit: Fit::Own,
             at: Place::Center,
             font_dirs: Vec::new(),
+            dpi: None,
+            trace: TraceSpec::default(),
         };
         let mut draft = read(&top, artwork, library, &|_| Err(io::ErrorKind::NotFound.into()))
             .expect("the defaults are complete, and a library can only be added to");
@@ -129,6 +134,7 @@ fn read(
     let layers = top.tables("layer", &LAYER)?;
     let operations = top.tables("operation", &OPERATION)?;
     let keep_outs = top.tables("keep_out", &KEEP_OUT)?;
+    let picture = artwork.is_picture();
     let draft = Draft {
         source: Source::default(),
         title: top.text("title").map(str::to_owned),
@@ -167,7 +173,7 @@ fn read(
                 }
             })
             .collect(),
-        layers: layers.iter().map(read_layer).collect::<Result<_, _>>()?,
+        layers: layers.iter().map(|table| read_layer(table, picture)).collect::<Result<_, _>>()?,
         operations: if operations.is_empty() {
             default_operations(top.source, library)?
         } else {
@@ -264,11 +270,53 @@ fn read_artwork(top: &Table<'_>) -> Result<ArtworkSpec, JobError> {
             return Err(table.impossible("scale", message, "take this away", help));
         }
     };
+    let dpi = table.number("dpi");
+    if dpi.is_some() && (width.is_some() || height.is_some()) {
+        let message = "the artwork's size is given twice: by `dpi` and in mm";
+        let help = "keep `dpi`, or `width_mm` and `height_mm`";
+        return Err(table.impossible("dpi", message, "take this away", help));
+    }
     Ok(ArtworkSpec {
         file: table.text("file").unwrap_or_default().to_owned(),
         fit,
         at: read_place(&table)?,
         font_dirs: table.texts("font_dirs"),
+        dpi,
+        trace: match table.table("trace", &TRACE) {
+            Some(trace) => read_trace(&trace?)?,
+            None => TraceSpec::default(),
+        },
+    })
+}
+
+fn read_trace(table: &Table<'_>) -> Result<TraceSpec, JobError> {
+    let methods = [TraceMethod::Auto, TraceMethod::Crack, TraceMethod::Moore, TraceMethod::Grey];
+    debug_assert_eq!(methods.len(), TRACE_METHODS.len());
+    let connectivity = match table.number("connectivity") {
+        Some(4.0) => Connectivity::Four,
+        Some(8.0) => Connectivity::Eight,
+        _ => {
+            let value = table.raw("connectivity").expect("the default is 4");
+            return Err(table.wrong_form("connectivity", value.span(), value.get_ref()));
+        }
+    };
+    let backdrop = match text_or_form(table, "backdrop")? {
+        "auto" => Backdrop::Auto,
+        "none" => Backdrop::None,
+        color => Backdrop::Color(read_color(color).ok_or_else(|| {
+            table.unknown_word("backdrop", "colour", color, &["auto", "none", "#rrggbb", "white"])
+        })?),
+    };
+    Ok(TraceSpec {
+        method: methods[table.choice("method")],
+        colors: table.sure_number("colors") as u32,
+        backdrop,
+        threshold: table.sure_number("threshold"),
+        connectivity,
+        smooth_px: table.number("smooth_px"),
+        corner_rad: table.sure_number("corner_deg").to_radians(),
+        simplify_px: table.sure_number("simplify_px"),
+        least_area_px: table.sure_number("least_area_px"),
     })
 }
 

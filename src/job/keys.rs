@@ -128,6 +128,8 @@ pub(super) mod rule {
     pub(in crate::job) const LEAVE_EXTRA_MM: f64 = 1.0;
     /// The part of the error budget that is not the user's: exact drops 0.002, three decimals 0.001, arc chords 0.002, mm.
     pub(in crate::job) const BUDGET_MM: f64 = 0.005;
+    /// `surface.significance` of layers of pictures.
+    pub(in crate::job) const SIGNIFICANCE: f64 = 0.15;
     /// Wood under the background below which the user is told, mm.
     pub(in crate::job) const THIN_FLOOR_MM: f64 = 2.0;
 }
@@ -154,6 +156,8 @@ pub(super) const JOINS: &[&str] = &["clusters", "pairs"];
 pub(super) const OPERATIONS: &[&str] = &["rough", "finish", "raster", "contour"];
 /// Ways of [`super::Pattern`], in its order.
 pub(super) const PATTERNS: &[&str] = &["contour", "raster"];
+/// Names of [`super::TraceMethod`], in its order.
+pub(super) const TRACE_METHODS: &[&str] = &["auto", "crack", "moore", "grey"];
 /// Names of [`super::Milling`], in its order.
 pub(super) const MILLINGS: &[&str] = &["climb", "conventional"];
 
@@ -183,8 +187,10 @@ const fn key(name: &'static str, kind: Kind, default: Fallback, doc: &'static st
 use Fallback::{Flag, Number, Required, Rule, Text};
 
 /// The sections of a job, in the order in which they are written out.
-pub(super) static JOB: [&Section; 10] =
-    [&TOP, &STOCK, &ARTWORK, &RELIEF, &TOLERANCE, &SAFETY, &KEEP_OUT, &LAYER, &SURFACE, &OPERATION];
+pub(super) static JOB: [&Section; 11] = [
+    &TOP, &STOCK, &ARTWORK, &TRACE, &RELIEF, &TOLERANCE, &SAFETY, &KEEP_OUT, &LAYER, &SURFACE,
+    &OPERATION,
+];
 
 /// Top level of a job.
 pub(super) static TOP: Section = Section {
@@ -279,7 +285,12 @@ pub(super) static ARTWORK: Section = Section {
     header: "[artwork]",
     doc: "the drawing; sizes are those of the box around its shapes",
     keys: &[
-        key("file", Kind::Text, Required, "the SVG file, seen from the job file's folder"),
+        key(
+            "file",
+            Kind::Text,
+            Required,
+            "the drawing (SVG) or picture (PNG, JPEG), seen from the job file's folder",
+        ),
         key(
             "width_mm",
             mm(0.1, LENGTH),
@@ -304,6 +315,82 @@ pub(super) static ARTWORK: Section = Section {
             Kind::Texts,
             Rule("the system's fonts"),
             "folders with fonts for text, as [\"fonts\"]",
+        ),
+        key(
+            "dpi",
+            Kind::Number { min: 1.0, max: 100_000.0, unit: "px/in" },
+            Rule("the picture's own, unless it is that of a screen (72 or 96)"),
+            "pixels an inch: the size of a picture (PNG, JPEG)",
+        ),
+        key(
+            "trace",
+            Kind::Forms("an [artwork.trace] table"),
+            Rule("as below"),
+            "how outlines are found in a picture (PNG, JPEG)",
+        ),
+    ],
+};
+
+/// `[artwork.trace]`
+pub(super) static TRACE: Section = Section {
+    name: "artwork.trace",
+    header: "[artwork.trace]",
+    doc: "how outlines are found in a picture (PNG, JPEG); lengths in its pixels",
+    keys: &[
+        key(
+            "method",
+            Kind::Choice(TRACE_METHODS),
+            Text("auto"),
+            "crack: along the sides of the pixels; grey: where darkness crosses the threshold; moore: through \
+             the centres of the pixels; auto: grey for one colour with soft borders, else crack",
+        ),
+        key(
+            "colors",
+            Kind::Whole { min: 2, max: 64 },
+            Number(16.0),
+            "most colours that are told apart, the backdrop included",
+        ),
+        key(
+            "backdrop",
+            Kind::Forms("\"auto\", \"none\" or a colour, as \"#ffffff\""),
+            Text("auto"),
+            "what is no layer; auto: transparent pixels, else the colour of the picture's rim",
+        ),
+        key(
+            "threshold",
+            Kind::Number { min: 0.02, max: 0.98, unit: "" },
+            Number(0.5),
+            "method grey: the share of ink (0 backdrop, 1 full) at which the outline runs",
+        ),
+        key(
+            "connectivity",
+            Kind::Forms("4 or 8"),
+            Number(4.0),
+            "8: pixels that touch only at a corner hang together",
+        ),
+        key(
+            "smooth_px",
+            Kind::Number { min: 0.0, max: 200.0, unit: "px" },
+            Rule("2; 1 where borders are blended"),
+            "sigma of the Gaussian that takes the pixels' stairs (or noise) out of the outline; 0 = none",
+        ),
+        key(
+            "corner_deg",
+            deg(5.0, 180.0),
+            Number(40.0),
+            "smoothing keeps corners that turn by at least this",
+        ),
+        key(
+            "simplify_px",
+            Kind::Number { min: 0.0, max: 10.0, unit: "px" },
+            Number(0.01),
+            "farthest that a straight piece may leave the smoothed outline",
+        ),
+        key(
+            "least_area_px",
+            Kind::Number { min: 0.0, max: 1e9, unit: "px^2" },
+            Number(4.0),
+            "smaller patches go to what surrounds them",
         ),
     ],
 };
@@ -580,7 +667,7 @@ pub(super) static SURFACE: Section = Section {
             "significance",
             Kind::Number { min: 0.0, max: 2.0, unit: "" },
             Number(0.0),
-            "branches shorter than this part of the junction's half width are cut (0.15 for scans); 0 = none",
+            "branches shorter than this part of the junction's half width are cut; 0 = none; layers of pictures: 0.15",
         ),
     ],
 };

@@ -23,11 +23,25 @@ pub(super) struct LayerDraft {
     pub(super) height_mm: Option<f64>,
 }
 
+impl LayerDraft {
+    /// Outlines traced from pixels keep waves of about a pixel: branches that small mean nothing.
+    fn cut_small_branches(&mut self) {
+        if let SurfaceSpec::Ruled(crest) | SurfaceSpec::Ratio(crest) = &mut self.spec.surface {
+            crest.skeleton.significance =
+                Some(Significance { abs_mm: None, rel: rule::SIGNIFICANCE });
+        }
+    }
+}
+
 impl Draft {
     /// The layers with their heights.
     pub(super) fn layers(&self, found: &Found) -> Result<Vec<LayerSpec>, JobError> {
         let drafts = if self.layers.is_empty() {
-            default_layers(&found.layers)
+            let mut layers = default_layers(&found.layers);
+            if self.artwork.is_picture() {
+                layers.iter_mut().for_each(LayerDraft::cut_small_branches);
+            }
+            layers
         } else {
             for (index, layer) in self.layers.iter().enumerate() {
                 self.check_selector(index, &layer.spec, &found.selectors)?;
@@ -107,12 +121,17 @@ impl Draft {
     }
 }
 
-/// Reads a layer from a checked table.
-pub(super) fn read_layer(table: &Table<'_>) -> Result<LayerDraft, JobError> {
+/// Reads a layer, of a drawing or of a picture, from a checked table.
+pub(super) fn read_layer(table: &Table<'_>, of_picture: bool) -> Result<LayerDraft, JobError> {
     let text = text_or_form(table, "select")?;
     let select = read_selector(table, text)?;
     let name = table.text("name").map_or_else(|| select.to_string(), str::to_owned);
-    layer(table, select, name)
+    let mut draft = layer(table, select, name)?;
+    let surface = table.raw("surface").and_then(|surface| surface.get_ref().as_table());
+    if of_picture && surface.is_none_or(|surface| surface.get("significance").is_none()) {
+        draft.cut_small_branches();
+    }
+    Ok(draft)
 }
 
 /// A layer without keys of its own: everything by default.
@@ -323,7 +342,7 @@ fn read_selector(table: &Table<'_>, text: &str) -> Result<Selector, JobError> {
 }
 
 /// `#rrggbb`, `#rgb` or a CSS name.
-fn read_color(text: &str) -> Option<Rgb> {
+pub(super) fn read_color(text: &str) -> Option<Rgb> {
     let Some(hex) = text.strip_prefix('#') else { return colors::named(text) };
     if !hex.bytes().all(|b| b.is_ascii_hexdigit()) {
         return None;

@@ -502,6 +502,7 @@ const UNITS: &[(&str, &str, f64)] = &[
     ("_deg", "angle", 1.0),
     ("_rad", "angle", 180.0 / std::f64::consts::PI),
     ("_rpm", "turns", 1.0),
+    ("_px", "pixels", 1.0),
     ("_s", "time", 1.0),
     ("_ms", "time", 0.001),
 ];

@@ -73,6 +73,22 @@ impl Draft {
         JobError::Unreadable(self.source.fault(span, message, "", help))
     }
 
+    /// Refuses keys that only mean something for pictures, for artwork that is none.
+    ///
+    /// # Errors
+    /// [`JobError::Impossible`] at the key.
+    pub fn refuse_picture_keys(&self) -> Result<(), JobError> {
+        for path in ["artwork.dpi", "artwork.trace"] {
+            if self.source.span_of(&[path]).is_some() {
+                let message =
+                    format!("{path} is for pictures, but {} is a drawing", self.artwork.file);
+                let help = "take it away, or give a PNG or JPEG as artwork.file";
+                return Err(self.impossible(&[path], &message, help));
+            }
+        }
+        Ok(())
+    }
+
     /// Refuses what does not go together; points at the first of `paths` that the job gives.
     pub(super) fn impossible(&self, paths: &[&str], message: &str, help: &str) -> JobError {
         // A job file cures what the artwork alone is wrong in, but for artwork without any shape.

@@ -187,6 +187,99 @@ pub struct ArtworkSpec {
     pub at: Place,
     /// Folders with fonts for text; empty = the system's.
     pub font_dirs: Vec<String>,
+    /// Pixels an inch of a picture; `None`: as the file says, if it does.
+    pub dpi: Option<f64>,
+    /// How outlines are found in a picture; without effect on drawings.
+    pub trace: TraceSpec,
+}
+
+impl ArtworkSpec {
+    /// Endings of the files that are taken to be pictures, lower case.
+    pub const PICTURES: [&str; 3] = ["png", "jpg", "jpeg"];
+
+    /// True when the file's ending is that of a picture.
+    pub fn is_picture(&self) -> bool {
+        let ending = self.file.rsplit_once('.').map_or("", |(_, ending)| ending);
+        Self::PICTURES.iter().any(|known| ending.eq_ignore_ascii_case(known))
+    }
+}
+
+/// How outlines are found in a picture (PNG, JPEG). Lengths are in pixels of the picture.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct TraceSpec {
+    /// What is followed.
+    pub method: TraceMethod,
+    /// Most colours that become layers, the backdrop included.
+    pub colors: u32,
+    /// What is no layer.
+    pub backdrop: Backdrop,
+    /// Grey method: the share of ink at which the outline runs, in 0..1.
+    pub threshold: f64,
+    /// Whether pixels that touch only at a corner hang together.
+    pub connectivity: Connectivity,
+    /// Standard deviation of the Gaussian that takes the pixels' stairs away, px; 0 = none, `None`: 2 along hard
+    /// borders of pixels, 1 where blended pixels tell the border more exactly.
+    pub smooth_px: Option<f64>,
+    /// Places where the outline turns by at least this within a few pixels stay sharp, radians.
+    pub corner_rad: f64,
+    /// Farthest that a straight piece may leave the smoothed outline, px.
+    pub simplify_px: f64,
+    /// Patches with less area than this go to what surrounds them, px^2.
+    pub least_area_px: f64,
+}
+
+impl Default for TraceSpec {
+    fn default() -> Self {
+        Self {
+            method: TraceMethod::Auto,
+            colors: 16,
+            backdrop: Backdrop::Auto,
+            threshold: 0.5,
+            connectivity: Connectivity::Four,
+            smooth_px: None,
+            corner_rad: 40_f64.to_radians(),
+            simplify_px: 0.01,
+            least_area_px: 4.0,
+        }
+    }
+}
+
+/// How the outlines of a picture are found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum TraceMethod {
+    /// By marching squares for pictures of one colour with blended borders on a backdrop, else along the cracks
+    /// between pixels of different colours.
+    Auto,
+    /// Along the cracks between pixels of different colours; neighbours share their borders.
+    Crack,
+    /// Through the centres of the pixels on the border (Moore neighbourhood), half a pixel inside the true border:
+    /// for outlines as older programs make them.
+    Moore,
+    /// The picture as ink on a backdrop, darkness (or opacity) as its share: marching squares at the threshold.
+    Grey,
+}
+
+/// Which pixels are no layer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Backdrop {
+    /// Transparent pixels; without any, the colour that covers most of the picture's rim, when it covers half of it.
+    Auto,
+    /// Only transparent pixels.
+    None,
+    /// The colour of the palette that is nearest to this one.
+    Color(Rgb),
+}
+
+/// Which pixels hang together.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Connectivity {
+    /// Those that share a side.
+    Four,
+    /// Those that share a side or a corner.
+    Eight,
 }
 
 /// How the size of the artwork is found. Sizes are those of the bounding box of its shapes.

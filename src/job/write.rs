@@ -7,12 +7,13 @@ use super::error::JobError;
 use super::keys::{
     ARTWORK, BACKGROUND, COMBINES, CUTTER, FOLLOWS, Fallback, JOB, JOINS, LAYER, MACHINE, MILLINGS,
     OPERATION, ORIGINS, PATTERNS, PROFILES, PRUNES, RELIEF, SAFETY, SPLITS, STOCK, SURFACE,
-    Section, TOLERANCE, TOP, WOOD, rule,
+    Section, TOLERANCE, TOP, TRACE, TRACE_METHODS, WOOD, rule,
 };
 use super::library::Library;
 use super::types::{
-    Background, CutterShape, CutterSpec, Fit, Found, Job, LayerSpec, Machine, Milling, Operation,
-    OperationKind, Pattern, Place, Prune, SkeletonSpec, Stepover, SurfaceSpec, Within, Wood,
+    Backdrop, Background, Connectivity, CutterShape, CutterSpec, Fit, Found, Job, LayerSpec,
+    Machine, Milling, Operation, OperationKind, Pattern, Place, Prune, SkeletonSpec, Stepover,
+    SurfaceSpec, TraceSpec, Within, Wood,
 };
 use crate::geom::{DVec2, DVec3};
 
@@ -38,6 +39,9 @@ impl Job {
         section("[stock]", &stock_lines(self));
         section("[stock.wood]", &wood_lines(&self.stock.wood));
         section("[artwork]", &artwork_lines(self));
+        if self.artwork.is_picture() {
+            section("[artwork.trace]", &trace_lines(&self.artwork.trace));
+        }
         section("[relief]", &relief_lines(self));
         section("[tolerance]", &tolerance_lines(self));
         section("[safety]", &safety_lines(self));
@@ -52,7 +56,7 @@ impl Job {
             section("[[keep_out]]", &lines);
         }
         for layer in &self.layers {
-            section("[[layer]]", &layer_lines(layer));
+            section("[[layer]]", &layer_lines(layer, self.artwork.is_picture()));
         }
         for operation in &self.operations {
             let mut lines = operation_lines(operation);
@@ -99,12 +103,15 @@ pub fn template(artwork_file: &str, found: &Found, library: &Library) -> Result<
     } else {
         page.section(&ARTWORK, &artwork, &["file", "width_mm"]);
     }
+    if job.artwork.is_picture() {
+        page.section(&TRACE, &trace_lines(&job.artwork.trace), &[]);
+    }
     page.section(&RELIEF, &relief_lines(&job), &[]);
     page.section(&TOLERANCE, &tolerance_lines(&job), &[]);
     page.section(&SAFETY, &safety_lines(&job), &[]);
     let mm = job.artwork_unit_mm;
     for (index, (layer, found)) in job.layers.iter().zip(&found.layers).enumerate() {
-        let lines = layer_lines(layer);
+        let lines = layer_lines(layer, job.artwork.is_picture());
         let extent = format!(
             "# {}: area {:.0} mm^2, {:.1} x {:.1} mm",
             layer.select,
@@ -180,7 +187,9 @@ impl Page {
         self.header(section, &format!("# {}", section.doc));
         for key in section.keys {
             let Some((_, value)) = lines.iter().find(|(name, _)| *name == key.name) else {
-                if let (Fallback::Rule(rule), true) = (key.default, section.name == ARTWORK.name) {
+                let explained = section.name == ARTWORK.name || section.name == TRACE.name;
+                let foreign = ["dpi", "trace", "font_dirs"].contains(&key.name);
+                if let (Fallback::Rule(rule), true, false) = (key.default, explained, foreign) {
                     let _ = writeln!(self.text, "#   {}: {} (now: {rule})", key.name, key.doc);
                 }
                 continue;
@@ -258,8 +267,37 @@ fn artwork_lines(job: &Job) -> Vec<Line> {
         Place::LowerLeft(point) => format!("[{}, {}]", number(point.x), number(point.y)),
     };
     lines.push(("at", at));
-    let dirs: Vec<String> = artwork.font_dirs.iter().map(|dir| quoted(dir)).collect();
-    lines.push(("font_dirs", format!("[{}]", dirs.join(", "))));
+    lines.extend(artwork.dpi.map(|dpi| ("dpi", number(dpi))));
+    if !artwork.is_picture() {
+        let dirs: Vec<String> = artwork.font_dirs.iter().map(|dir| quoted(dir)).collect();
+        lines.push(("font_dirs", format!("[{}]", dirs.join(", "))));
+    }
+    lines
+}
+
+fn trace_lines(trace: &TraceSpec) -> Vec<Line> {
+    let backdrop = match trace.backdrop {
+        Backdrop::Auto => quoted("auto"),
+        Backdrop::None => quoted("none"),
+        Backdrop::Color(color) => quoted(&color.to_string()),
+    };
+    let connectivity = match trace.connectivity {
+        Connectivity::Four => 4,
+        Connectivity::Eight => 8,
+    };
+    let mut lines = vec![
+        ("method", quoted(TRACE_METHODS[trace.method as usize])),
+        ("colors", trace.colors.to_string()),
+        ("backdrop", backdrop),
+        ("threshold", number(trace.threshold)),
+        ("connectivity", connectivity.to_string()),
+    ];
+    lines.extend(trace.smooth_px.map(|sigma| ("smooth_px", number(sigma))));
+    lines.extend([
+        ("corner_deg", degrees(trace.corner_rad)),
+        ("simplify_px", number(trace.simplify_px)),
+        ("least_area_px", number(trace.least_area_px)),
+    ]);
     lines
 }
 
@@ -294,7 +332,7 @@ fn safety_lines(job: &Job) -> Vec<Line> {
     ]
 }
 
-fn surface_lines(surface: &SurfaceSpec) -> Vec<Line> {
+fn surface_lines(surface: &SurfaceSpec, of_picture: bool) -> Vec<Line> {
     let (method, crest) = match surface {
         SurfaceSpec::Profile { profile, radius_mm } => {
             let mut lines = vec![
@@ -335,12 +373,14 @@ fn surface_lines(surface: &SurfaceSpec) -> Vec<Line> {
     if own.join != plain.join {
         lines.push(("join", quoted(JOINS[own.join as usize])));
     }
-    lines.extend(own.significance.map(|s| ("significance", number(s.rel))));
+    // Layers of pictures have one by default.
+    let significance = own.significance.map(|s| s.rel).or_else(|| of_picture.then_some(0.0));
+    lines.extend(significance.map(|rel| ("significance", number(rel))));
     lines
 }
 
-fn layer_lines(layer: &LayerSpec) -> Vec<Line> {
-    let surface = surface_lines(&layer.surface);
+fn layer_lines(layer: &LayerSpec, of_picture: bool) -> Vec<Line> {
+    let surface = surface_lines(&layer.surface, of_picture);
     debug_assert!(surface.iter().all(|(name, _)| SURFACE.key(name).is_some()));
     let cap = if layer.slope_cap.is_finite() { number(layer.slope_cap) } else { quoted("none") };
     vec![

@@ -1,7 +1,7 @@
 //! The laws of a [`Region`], exact.
 
 use super::Region;
-use super::edge_grid::{Edge, EdgeGrid, crossing_point, meets};
+use crate::geom::edge_grid::{Edge, EdgeGrid, crossing_point, meets};
 use crate::geom::{DVec2, bounds_of, contains_even_odd, orient, signed_area};
 
 /// Which law a region breaks, and where (mm).

@@ -2,12 +2,12 @@
 
 use rayon::prelude::*;
 
-use super::edge_grid::EdgeGrid;
 use super::notes::{self, Change, Gone};
 use super::regions::{self, Built};
 use super::{Figure, OutlineError, OutlineLayer, Outlines};
 use crate::artwork::boolean::{self, FixedGrid, NodeRing};
 use crate::artwork::{FillRule, Part, Placed, Shape, curve};
+use crate::geom::edge_grid::EdgeGrid;
 use crate::geom::{DVec2, Tolerance, bounds_of};
 use crate::job::LayerSpec;
 

@@ -6,7 +6,7 @@ use crate::gcode::read;
 use crate::geom::{DVec2, DVec3, Grid, Move, MoveKind, Tolerance};
 use crate::job::{
     ArtworkSpec, Background, CutterShape, Fit, Machine, Operation, OperationKind, Origin, Place,
-    ReliefSpec, Stepover, Stock, Within, Wood,
+    ReliefSpec, Stepover, Stock, TraceSpec, Within, Wood,
 };
 use crate::stock::Block;
 use proptest::prelude::*;
@@ -64,6 +64,8 @@ pub(super) fn job(cutter: CutterSpec) -> Job {
             fit: Fit::Own,
             at: Place::Center,
             font_dirs: vec![],
+            dpi: None,
+            trace: TraceSpec::default(),
         },
         relief: ReliefSpec { pitch_mm: 0.1, depth_mm: 2.0, background: Background::Clear },
         layers: vec![],

@@ -2,7 +2,7 @@ use super::*;
 use crate::geom::{DVec3, Ring, Tolerance};
 use crate::job::{
     ArtworkSpec, Fit, Machine, Origin, Place as At, Profile, ReliefSpec, Selector, Stock,
-    SurfaceSpec, Wood,
+    SurfaceSpec, TraceSpec, Wood,
 };
 use crate::outline::{OutlineLayer, Region};
 use crate::relief::grid_of;
@@ -48,6 +48,8 @@ fn job(layers: Vec<LayerSpec>) -> Job {
             fit: Fit::Own,
             at: At::Center,
             font_dirs: vec![],
+            dpi: None,
+            trace: TraceSpec::default(),
         },
         relief: ReliefSpec { pitch_mm: PITCH, depth_mm: 8.0, background: Background::Clear },
         layers,

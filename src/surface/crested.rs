@@ -9,7 +9,7 @@ use super::profile::{self, Flank};
 use super::ridge::{Heights, Ridge};
 use super::rungs::{Rungs, rungs};
 use super::{FINE, Patch, Remark, Segments, Surface, Window, inscribed_radius, ratio, ruled};
-use crate::geom::{Grid, Tolerance};
+use crate::geom::{DVec2, Grid, Tolerance};
 use crate::job::{CrestSpec, LayerSpec, SkeletonSpec};
 use crate::outline::{Figure, Region};
 use crate::skeleton::{
@@ -22,6 +22,10 @@ use rayon::prelude::*;
 const FACET_PER_CHORD: f64 = 0.05;
 /// Shortest edge of the resampled outline, in cells.
 const LEAST_EDGE_CELLS: f64 = 2.0;
+/// An end of the spine is a ripple when its base is narrower than this part of the largest inscribed radius.
+const RIPPLE: f64 = 0.35;
+/// More ripples than this make an outline rough.
+const RIPPLES: usize = 12;
 /// Rounds of smoothing for a spine that no rungs carry.
 const SMOOTH_ROUNDS: usize = 2;
 
@@ -148,6 +152,28 @@ pub(super) fn raise(
     if parts.len() == 1 { parts.swap_remove(0) } else { Surface::Parts(parts) }
 }
 
+/// A remark when more than [`RIPPLES`] ends of the spine, and more than half of them, close limbs much narrower than
+/// the figure. The number of corners says nothing here: noise makes as many of them as of ends.
+fn rough(skeleton: &Skeleton, inscribed_mm: f64, at: DVec2) -> Option<Remark> {
+    let sampled = &skeleton.sampled;
+    let caps = &skeleton.cells.caps;
+    let small = caps.iter().filter(|cap| !cap.closed).filter_map(|cap| {
+        let (a, b) = (sampled.at(*cap.chain.first()?), sampled.at(*cap.chain.last()?));
+        (a.distance(b) < RIPPLE * inscribed_mm).then(|| {
+            let edges = cap.chain[..cap.chain.len() - 1].iter();
+            edges.map(|v| sampled.edge_length(*v)).sum::<f64>()
+        })
+    });
+    let lengths: Vec<f64> = small.collect();
+    let ripples = lengths.len();
+    let many = ripples > RIPPLES && 2 * ripples > caps.len();
+    many.then(|| Remark::Rough {
+        ripples,
+        length_mm: lengths.iter().sum::<f64>() / ripples as f64,
+        at,
+    })
+}
+
 /// One region and all that its surface depends on.
 struct Part<'a> {
     region: &'a Region,
@@ -179,6 +205,7 @@ impl Part<'_> {
                 return Surface::Field(profile::raise(&figure, &flank, grid, &mut Vec::new()));
             }
         };
+        remarks.extend(rough(&skeleton, inscribed, at));
         let ridge = ridge_of(layer, method.crest, region.holes.len() + 1);
         let heights = ridge.heights(&skeleton.spine);
         self.remark_cap(&heights, remarks);

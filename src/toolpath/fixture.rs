@@ -4,7 +4,7 @@ use crate::geom::{DVec2, DVec3, Grid, Heightfield, Tolerance};
 use crate::job::{
     ArtworkSpec, Background, Combine, CutterShape, CutterSpec, Fit, Follow, Job, LayerSpec,
     Machine, Milling, Operation, OperationKind, Origin, Pattern, Place, Profile, ReliefSpec,
-    Selector, Stepover, Stock, SurfaceSpec, Within, Wood,
+    Selector, Stepover, Stock, SurfaceSpec, TraceSpec, Within, Wood,
 };
 use proptest::prelude::{Strategy, any, prop};
 
@@ -62,7 +62,14 @@ pub(crate) fn job(
             grain_rad: 0.0,
             origin: Origin::LowerLeft,
         },
-        artwork: ArtworkSpec { file, fit: Fit::Own, at: Place::Center, font_dirs: Vec::new() },
+        artwork: ArtworkSpec {
+            file,
+            fit: Fit::Own,
+            at: Place::Center,
+            font_dirs: Vec::new(),
+            dpi: None,
+            trace: TraceSpec::default(),
+        },
         relief: ReliefSpec { pitch_mm, depth_mm: 5.0, background: Background::Clear },
         layers: vec![layer],
         operations,

@@ -432,3 +432,29 @@ fn boundaries_that_cannot_be_are_refused() {
     refused(&within("3"), form, (5, 10), &["list of layers"]);
     draft(&within("\"artwork\"")).unwrap();
 }
+
+#[test]
+fn settings_of_a_picture_have_their_faults() {
+    let trace = |line: &str| format!("[artwork]\nfile = \"a.png\"\n[artwork.trace]\n{line}\n");
+    let unknown = |e: &JobError| matches!(e, JobError::UnknownKey(_));
+    refused(&trace("colours = 3"), unknown, (4, 1), &["did you mean `colors`?"]);
+    refused(&with("threshold = 0.3\n"), unknown, (3, 1), &["belongs in [artwork.trace]"]);
+    let unit = |e: &JobError| matches!(e, JobError::WrongUnit(_));
+    refused(&trace("smooth_mm = 3"), unit, (4, 1), &["did you mean `smooth_px`?"]);
+    let range = |e: &JobError| matches!(e, JobError::OutOfRange(_));
+    refused(&trace("threshold = 1.5"), range, (4, 13), &["between 0.02 and 0.98"]);
+    refused(&trace("colors = 1"), range, (4, 10), &["between 2 and 64"]);
+    let kind = |e: &JobError| matches!(e, JobError::WrongType(_));
+    refused(&trace("connectivity = 6"), kind, (4, 16), &["must be 4 or 8"]);
+    let name = |e: &JobError| matches!(e, JobError::UnknownName(_));
+    refused(
+        &trace("backdrop = \"whit\""),
+        name,
+        (4, 12),
+        &["no colour", "did you mean \"white\"?"],
+    );
+    refused(&trace("method = \"potrace\""), name, (4, 10), &["auto, crack, moore, grey"]);
+    let twice = |e: &JobError| matches!(e, JobError::Impossible(_));
+    let size = "[artwork]\nfile = \"a.png\"\nwidth_mm = 100\ndpi = 300\n";
+    refused(size, twice, (4, 7), &["size is given twice", "`dpi`"]);
+}

@@ -251,3 +251,53 @@ fn hostile_nesting_is_refused() {
 fn a_byte_order_mark_is_no_fault() {
     assert_eq!(job("\u{feff}[artwork]\nfile = \"a.svg\"\n").unwrap().artwork.file, "a.svg");
 }
+
+#[test]
+fn settings_of_a_picture_are_written_and_come_back() {
+    let text = "[artwork]\nfile = \"scan.PNG\"\ndpi = 300\n[artwork.trace]\nmethod = \"crack\"\ncolors = 5\n\
+                backdrop = \"#0a0B0c\"\nthreshold = 0.4\nconnectivity = 8\nsmooth_px = 3.5\ncorner_deg = 33\n\
+                simplify_px = 0.1\nleast_area_px = 9\n[[layer]]\nselect = \"all\"\n[[layer]]\nselect = \"all\"\n\
+                surface = { method = \"ratio\", significance = 0 }\n";
+    let library = Library::built_in();
+    let load = |text: &str| {
+        Draft::from_toml(text, "t.toml", &library, &no_files).unwrap().settle(&found()).unwrap()
+    };
+    let mut job = load(text);
+    let want = TraceSpec {
+        method: TraceMethod::Crack,
+        colors: 5,
+        backdrop: Backdrop::Color(Rgb(10, 11, 12)),
+        threshold: 0.4,
+        connectivity: Connectivity::Eight,
+        smooth_px: Some(3.5),
+        corner_rad: 33_f64.to_radians(),
+        simplify_px: 0.1,
+        least_area_px: 9.0,
+    };
+    assert_eq!((job.artwork.trace, job.artwork.dpi), (want, Some(300.0)));
+    // Small branches of traced outlines mean nothing, unless the job says so.
+    let significance = |layer: &LayerSpec| match &layer.surface {
+        SurfaceSpec::Ruled(crest) | SurfaceSpec::Ratio(crest) => crest.skeleton.significance,
+        SurfaceSpec::Profile { .. } => None,
+    };
+    let some = Some(Significance { abs_mm: None, rel: 0.15 });
+    assert_eq!(job.layers.iter().map(significance).collect::<Vec<_>>(), [some, None]);
+    let mut again = load(&job.to_toml());
+    job.notes.clear();
+    again.notes.clear();
+    assert_eq!(again, job);
+    // A picture without any settings, and its template.
+    let plain = Draft::for_artwork("scan.jpeg", &library).settle(&found()).unwrap();
+    assert_eq!(plain.artwork.trace, TraceSpec::default());
+    assert!(plain.layers.iter().all(|layer| significance(layer) == some));
+    let text = template("scan.jpeg", &found(), &library).unwrap();
+    assert!(text.contains("[artwork.trace]") && text.contains("# connectivity = 4"), "{text}");
+    assert!(!text.contains("font_dirs"), "{text}");
+    assert_eq!(load(&text), plain);
+    let mut out = load(&uncommented(&text));
+    assert_eq!((out.artwork.trace, &out.layers), (plain.artwork.trace, &plain.layers));
+    out.notes.clear();
+    // A drawing has none of it.
+    let text = template("lotus.svg", &found(), &library).unwrap();
+    assert!(!text.contains("trace") && !text.contains("dpi"), "{text}");
+}

@@ -1,20 +1,23 @@
 //! Edges in a uniform grid, so that only neighbours are tested against each other.
 
-use crate::geom::{Bounds, DVec2, orient};
+use super::{Bounds, DVec2, orient};
 
-/// A directed edge of a ring.
+/// No edge follows.
+pub(crate) const NO_EDGE: u32 = u32::MAX;
+
+/// A directed edge of a ring or line.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Edge {
-    pub(super) a: DVec2,
-    pub(super) b: DVec2,
-    /// Index of the edge that begins at `b`.
-    pub(super) next: u32,
+pub(crate) struct Edge {
+    pub(crate) a: DVec2,
+    pub(crate) b: DVec2,
+    /// Index of the edge that begins at `b`; [`NO_EDGE`] at the end of an open line.
+    pub(crate) next: u32,
 }
 
-/// Edges of some rings, sorted into square cells of side `sqrt(width * height / n)`.
+/// Edges of some rings or lines, sorted into square cells of side `sqrt(width * height / n)`.
 #[derive(Debug)]
-pub(super) struct EdgeGrid {
-    pub(super) edges: Vec<Edge>,
+pub(crate) struct EdgeGrid {
+    pub(crate) edges: Vec<Edge>,
     origin: DVec2,
     cell: f64,
     nx: usize,
@@ -25,16 +28,28 @@ pub(super) struct EdgeGrid {
 
 impl EdgeGrid {
     /// Sorts the edges of finite rings.
-    pub(super) fn new<'a>(rings: impl IntoIterator<Item = &'a [DVec2]>) -> Self {
+    pub(crate) fn new<'a>(rings: impl IntoIterator<Item = &'a [DVec2]>) -> Self {
+        Self::of_lines(rings.into_iter().map(|ring| (ring, true)))
+    }
+
+    /// Sorts the edges of finite lines, closed where the flag says so.
+    pub(crate) fn of_lines<'a>(lines: impl IntoIterator<Item = (&'a [DVec2], bool)>) -> Self {
         let mut edges = Vec::new();
         let mut bounds = Bounds::EMPTY;
-        for ring in rings {
+        for (points, closed) in lines {
             let first = edges.len() as u32;
-            let n = ring.len() as u32;
-            for (i, &a) in ring.iter().enumerate() {
+            let n = points.len();
+            for (i, &a) in points.iter().enumerate().take(n - usize::from(!closed && n > 0)) {
+                let b = points[(i + 1) % n];
                 bounds.add(a);
-                let next = first + (i as u32 + 1) % n;
-                edges.push(Edge { a, b: ring[(i + 1) % ring.len()], next });
+                bounds.add(b);
+                let last = i + 1 == n - usize::from(!closed);
+                let next = match (last, closed) {
+                    (false, _) => first + i as u32 + 1,
+                    (true, true) => first,
+                    (true, false) => NO_EDGE,
+                };
+                edges.push(Edge { a, b, next });
             }
         }
         let n = edges.len().max(1) as f64;
@@ -102,7 +117,7 @@ impl EdgeGrid {
 
     /// Calls `f` with each pair of edges that share a cell (some pairs more than once) and a box, until it
     /// returns `false`.
-    pub(super) fn for_pairs(&self, mut f: impl FnMut(usize, usize, usize) -> bool) {
+    pub(crate) fn for_pairs(&self, mut f: impl FnMut(usize, usize, usize) -> bool) {
         for (cell, range) in self.starts.windows(2).enumerate() {
             let items = &self.items[range[0] as usize..range[1] as usize];
             for (k, &i) in items.iter().enumerate() {
@@ -117,7 +132,7 @@ impl EdgeGrid {
     }
 
     /// How often edges cross each other (at inner points of both); stops above `limit`.
-    pub(super) fn crossings(&self, limit: usize) -> usize {
+    pub(crate) fn crossings(&self, limit: usize) -> usize {
         let mut count = 0;
         self.for_pairs(|cell, i, j| {
             let (e, g) = (&self.edges[i], &self.edges[j]);
@@ -144,7 +159,7 @@ fn boxes_meet(e: &Edge, g: &Edge) -> bool {
 }
 
 /// True when two edges cross at inner points of both; exact.
-pub(super) fn crosses(e: &Edge, g: &Edge) -> bool {
+pub(crate) fn crosses(e: &Edge, g: &Edge) -> bool {
     let side = |p: &Edge, q: DVec2| orient(p.a, p.b, q);
     let (s0, s1) = (side(e, g.a), side(e, g.b));
     if !((s0 > 0.0 && s1 < 0.0) || (s0 < 0.0 && s1 > 0.0)) {
@@ -155,7 +170,7 @@ pub(super) fn crosses(e: &Edge, g: &Edge) -> bool {
 }
 
 /// True when two edges whose boxes meet have a point in common; exact, end points count.
-pub(super) fn meets(e: &Edge, g: &Edge) -> bool {
+pub(crate) fn meets(e: &Edge, g: &Edge) -> bool {
     let (s0, s1) = (orient(e.a, e.b, g.a), orient(e.a, e.b, g.b));
     if (s0 > 0.0 && s1 > 0.0) || (s0 < 0.0 && s1 < 0.0) {
         return false;
@@ -165,7 +180,7 @@ pub(super) fn meets(e: &Edge, g: &Edge) -> bool {
 }
 
 /// Where the lines of two crossing edges meet, rounded.
-pub(super) fn crossing_point(e: &Edge, g: &Edge) -> DVec2 {
+pub(crate) fn crossing_point(e: &Edge, g: &Edge) -> DVec2 {
     let (d, f) = (e.b - e.a, g.b - g.a);
     let t = (g.a - e.a).perp_dot(f) / d.perp_dot(f);
     if t.is_finite() { e.a + d * t.clamp(0.0, 1.0) } else { e.a }
