@@ -62,8 +62,13 @@ pub struct Planner {
 impl Planner {
     /// A planner at rest whose lines are always there in time.
     pub fn new(machine: &Machine) -> Self {
+        Self::with_limits(Limits::from(machine))
+    }
+
+    /// The same for these settings.
+    pub fn with_limits(limits: Limits) -> Self {
         Self {
-            ring: Ring::new(Limits::from(machine)),
+            ring: Ring::new(limits),
             lines: VecDeque::new(),
             gauge: Gauge::default(),
             entry2: 0.0,
@@ -100,13 +105,23 @@ impl Planner {
             MoveKind::Rapid => Pace::Rapid,
             MoveKind::Feed { feed_mm_per_min } => Pace::Feed(feed_mm_per_min / 60.0),
         };
-        let steps = std::array::from_fn(|k| to[k] - from[k]);
+        self.push_steps(std::array::from_fn(|k| to[k] - from[k]), pace, mv.line);
+    }
+
+    /// Adds a move of so many steps of each axis; the oldest block leaves when the ring is full.
+    pub fn push_steps(&mut self, steps: [i64; 3], pace: Pace, line: u32) {
         if self.ring.push(steps, pace) {
-            self.lines.push_back(mv.line);
+            self.lines.push_back(line);
             if self.ring.is_full() {
                 self.settle_oldest();
             }
         }
+    }
+
+    /// New settings; the motion stops first.
+    pub fn set_limits(&mut self, limits: Limits) {
+        self.sync();
+        self.ring = Ring::new(limits);
     }
 
     /// Waits; the motion stops first.
