@@ -81,7 +81,13 @@ impl Planner {
 
     /// A planner at rest whose lines come over a serial line of this speed, bit/s, as [`Planner::line`] tells.
     pub fn with_baud(machine: &Machine, baud: f64) -> Self {
-        Self { supply: Some(Supply::new(baud)), ..Self::new(machine) }
+        Self::new(machine).supplied(baud)
+    }
+
+    /// The same whose lines come over a serial line of this speed, bit/s.
+    #[must_use]
+    pub fn supplied(self, baud: f64) -> Self {
+        Self { supply: Some(Supply::new(baud)), ..self }
     }
 
     /// The next line of the program, with this many bytes (its end included), comes before what follows.

@@ -168,8 +168,10 @@ fn zigzag(lines: usize) -> String {
     text + "G0 X0 Y0\nM30\n"
 }
 
-/// Slow moves of half a minute each: the machine is always in the middle of one.
-const SLOW: &str = "G21 G90\nF400\nG1 X200\nX0\nX200\nX0\n";
+/// Slow moves of half a minute each, more than the planner holds: the machine is always in the middle of one.
+fn slow() -> String {
+    format!("G21 G90\nF400\n{}", "G1 X200\nG1 X0\n".repeat(20))
+}
 
 #[test]
 fn a_job_comes_through_line_by_line() {
@@ -195,7 +197,7 @@ fn a_job_comes_through_line_by_line() {
 fn a_stopped_job_rests_before_the_reset_and_leaves_130() {
     for signal in [Signal::INT, Signal::TERM, Signal::HUP] {
         let desk = Desk::new();
-        desk.put("slow.nc", SLOW);
+        desk.put("slow.nc", &slow());
         let c = desk.controller(&[]);
         let job = desk.stream(&["slow.nc", "--port", &c.port, "--yes", "--json"]);
         job.until("\"state\":\"Run\"");
@@ -207,7 +209,7 @@ fn a_stopped_job_rests_before_the_reset_and_leaves_130() {
         }
         let (code, err) = job.end();
         assert_eq!(code, Some(130), "{err}");
-        assert!(err.contains("stopped as asked at about line 3 'G1X200'"), "{err}");
+        assert!(err.contains("stopped as asked at about line ") && err.contains(" 'G1X"), "{err}");
         assert!(err.contains("position and zero are kept"), "{err}");
         let (there, back) = desk.talk();
         let (_, after_hold) = there.split_once('!').unwrap();
@@ -221,7 +223,7 @@ fn a_stopped_job_rests_before_the_reset_and_leaves_130() {
 #[test]
 fn a_second_ctrl_c_resets_at_once() {
     let desk = Desk::new();
-    desk.put("slow.nc", SLOW);
+    desk.put("slow.nc", &slow());
     let c = desk.controller(&[]);
     let job = desk.stream(&["slow.nc", "--port", &c.port, "--yes", "--json"]);
     // Up to speed it takes the factory's settings more than half a second to brake.
@@ -238,14 +240,14 @@ fn a_second_ctrl_c_resets_at_once() {
 #[test]
 fn a_killed_controller_is_a_lost_port() {
     let desk = Desk::new();
-    desk.put("slow.nc", SLOW);
+    desk.put("slow.nc", &slow());
     let mut c = desk.controller(&[]);
     let job = desk.stream(&["slow.nc", "--port", &c.port, "--yes", "--json"]);
     job.until("\"state\":\"Run\"");
     c.child.kill().unwrap();
     let (code, err) = job.end();
     assert_eq!(code, Some(3), "{err}");
-    assert!(err.contains("the port is gone at about line 3 'G1X200'"), "{err}");
+    assert!(err.contains("the port is gone at about line ") && err.contains(" 'G1X"), "{err}");
     assert!(err.contains("be ready to switch it off"), "{err}");
 }
 
@@ -425,7 +427,7 @@ impl Person {
 fn somebody_at_the_terminal_confirms_holds_and_stops() {
     use rustix::termios::{LocalModes, tcgetattr};
     let desk = Desk::new();
-    desk.put("slow.nc", SLOW);
+    desk.put("slow.nc", &slow());
     let c = desk.controller(&[]);
     let mut person = Person::sit_down();
     // A session of its own, so that the terminal is the one that it belongs to.

@@ -138,6 +138,7 @@ pub(super) fn run(args: &Args) -> Result<(), Stop> {
         check_on_machine: args.check_on_machine,
         attended: keyboard.is_some(),
         profile: profile.clone(),
+        baud: (!args.port.starts_with("tcp://")).then_some(args.baud),
     };
     signals::watch(commands)?;
     let mut link = open(args, profile.as_ref())?;

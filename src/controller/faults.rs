@@ -64,6 +64,7 @@ impl Fault {
 
 /// The faults in force.
 #[derive(Debug, Clone, Default)]
+#[allow(clippy::struct_excessive_bools, reason = "each goes wrong by itself")]
 pub(super) struct Faults {
     next_ok: Option<Fault>,
     silent: bool,

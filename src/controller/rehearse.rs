@@ -98,7 +98,10 @@ impl Extent {
 pub struct Rehearsal {
     controller: Controller,
     planner: Planner,
+    /// The targets so far, in machine coordinates and in those of the work.
     extent: Option<(Extent, Extent)>,
+    /// Where the first motion began, machine coordinates, mm.
+    begun_mm: Option<DVec3>,
     fastest_rpm: f64,
     pauses: bool,
     /// False after homing or a probe: where that ends is known to the machine alone.
@@ -130,10 +133,18 @@ impl Rehearsal {
             planner: Planner::with_limits(standing.store.limits()),
             controller,
             extent: None,
+            begun_mm: None,
             fastest_rpm: 0.0,
             pauses: false,
             end_is_known: true,
         })
+    }
+
+    /// The same with lines that come over a serial line of this speed, bit/s; otherwise they are there in time.
+    #[must_use]
+    pub fn supplied(mut self, baud: f64) -> Self {
+        self.planner = self.planner.supplied(baud);
+        self
     }
 
     /// The next line, without comments and spaces, in capitals.
@@ -146,6 +157,7 @@ impl Rehearsal {
         if dollar {
             c.stepper = Stepper::new(c.planned);
         }
+        self.planner.line(text.len() + 1);
         let overflow = text.len() > super::LINE_CHARACTERS;
         let line = Line { text: text.as_bytes().to_vec(), comment: None, overflow };
         c.take_up(&line).map_err(Trouble::Refused)?;
@@ -167,7 +179,7 @@ impl Rehearsal {
             Task::Wait(seconds) => self.planner.dwell(seconds),
             Task::Line { to, pace } => self.go(to, pace)?,
             Task::Jog { to, feed_mm_per_min } => {
-                self.go(to, Pace::Fixed(feed_mm_per_min / 60.0))?
+                self.go(to, Pace::Fixed(feed_mm_per_min / 60.0))?;
             }
             Task::ProbeBegin { to, pace, .. } => {
                 self.end_is_known = false;
@@ -191,6 +203,7 @@ impl Rehearsal {
         {
             return Err(trouble);
         }
+        self.begun_mm.get_or_insert(c.ring.limits().point_mm(c.planned));
         let target = c.ring.limits().steps(to);
         let steps = std::array::from_fn(|k| target[k].saturating_sub(c.planned[k]));
         self.planner.push_steps(steps, pace, 0);
@@ -204,7 +217,7 @@ impl Rehearsal {
 
     /// How long all that is settled takes, s: everything but what the planner still holds.
     pub fn seconds(&self) -> f64 {
-        self.planner.times().total_s()
+        self.planner.times().total_s() + self.planner.starved_s()
     }
 
     /// The same when everything has come to rest, s.
@@ -212,19 +225,21 @@ impl Rehearsal {
         self.planner.clone().finish()
     }
 
-    /// The box of all targets in machine coordinates; `None` while nothing has moved.
+    /// The box of all motion in machine coordinates; `None` while nothing has moved.
     pub fn machine_extent(&self) -> Option<Extent> {
-        self.extent.map(|(machine, _)| machine)
+        let (mut machine, _) = self.extent?;
+        machine.add(self.begun_mm?);
+        Some(machine)
     }
 
-    /// The same in the coordinates of the work.
+    /// The box of all targets in the coordinates of the work.
     pub fn work_extent(&self) -> Option<Extent> {
         self.extent.map(|(_, work)| work)
     }
 
-    /// The part of the box that lies outside the travel ($130-$132), whatever $20 says.
+    /// A target outside the travel ($130-$132), whatever $20 says.
     pub fn beyond_travel(&self) -> Option<Trouble> {
-        let Extent { low, high } = self.machine_extent()?;
+        let (Extent { low, high }, _) = self.extent?;
         let store = &self.controller.store;
         beyond(store, low).or_else(|| beyond(store, high))
     }

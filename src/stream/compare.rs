@@ -12,6 +12,7 @@ const ALIKE: f64 = 0.01;
 const JUNCTION_DEVIATION: u8 = 11;
 const ARC_TOLERANCE: u8 = 12;
 const INCHES: u8 = 13;
+const SOFT_LIMITS: u8 = 20;
 const HOMING: u8 = 22;
 const MAX_RPM: u8 = 30;
 const MIN_RPM: u8 = 31;
@@ -19,6 +20,9 @@ const LASER: u8 = 32;
 const MAX_RATE: u8 = 110;
 const ACCELERATION: u8 = 120;
 const TRAVEL: u8 = 130;
+
+/// The letter in `[OPT:...]` of a build that makes the place of homing the machine's zero.
+const SETS_ORIGIN: char = 'Z';
 
 /// What `$#` tells of the EEPROM.
 const SYSTEMS: [&str; 8] = ["G54", "G55", "G56", "G57", "G58", "G59", "G28", "G30"];
@@ -36,6 +40,8 @@ pub struct Identity {
     pub standing: Standing,
     /// Settings that it has and GRBL 1.1 has not.
     pub unknown: Vec<String>,
+    /// Machine coordinates go from minus the travel to zero, as GRBL has them unless it was built otherwise.
+    world_is_negative: bool,
 }
 
 impl Identity {
@@ -55,7 +61,9 @@ impl Identity {
             ring_bytes: None,
             standing: Standing::fresh(Store::default()),
             unknown: Vec::new(),
+            world_is_negative: true,
         };
+        let mut sets_origin = false;
         let (mut kept, mut offset, mut length) = (String::new(), DVec3::ZERO, 0.0);
         for line in said {
             let inner = line.strip_prefix('[').and_then(|l| l.strip_suffix(']'));
@@ -65,6 +73,7 @@ impl Identity {
                 }
                 Some(("OPT", rest)) => {
                     identity.ring_bytes = rest.split(',').nth(2).and_then(|v| v.parse().ok());
+                    sets_origin = rest.split(',').next().is_some_and(|o| o.contains(SETS_ORIGIN));
                 }
                 Some(("GC", rest)) => identity.standing.modes = rest.to_string(),
                 Some(("G92", rest)) => offset = point(rest).unwrap_or_default(),
@@ -76,6 +85,11 @@ impl Identity {
             }
         }
         identity.standing.store = Store::from_text(&kept)?;
+        identity.world_is_negative = !sets_origin;
+        if sets_origin {
+            // Its limits lie elsewhere than those of the simulation.
+            let _ = identity.standing.store.set(SOFT_LIMITS, 0.0);
+        }
         let unit = if identity.reports_inches() { 25.4 } else { 1.0 };
         identity.standing.offset_mm = offset * unit;
         identity.standing.tool_length_mm = length * unit;
@@ -145,7 +159,7 @@ pub(super) fn compare(
 
 fn fits_travel(identity: &Identity, rehearsed: &Rehearsed, found: &mut Vec<Finding>) {
     let travel = identity.axes(TRAVEL);
-    if identity.homes() {
+    if identity.homes() && identity.world_is_negative {
         if let Some((at, trouble)) = &rehearsed.first_beyond {
             found.push(Finding::Refusal(format!(
                 "{at} would leave the machine: {trouble}; check the work zero against the program's size"

@@ -4,9 +4,6 @@ use super::{Place, Script};
 use crate::controller::{Extent, Refusal, Rehearsal, Standing, Trouble};
 use crate::geom::DVec3;
 
-/// Lines between two marks of the time line.
-const MARK_LINES: usize = 8;
-
 /// What a rehearsal tells of a program.
 #[derive(Debug, Clone)]
 pub struct Rehearsed {
@@ -26,9 +23,8 @@ pub struct Rehearsed {
     pub first_pause: Option<Place>,
     /// The first line that leaves the travel ($130-$132) although soft limits are off.
     pub first_beyond: Option<(Place, Trouble)>,
-    lines: usize,
-    /// Time before each [`MARK_LINES`]th line, s. What the planner holds then is not in it.
-    marks_s: Vec<f64>,
+    /// Time after each line, s; what the planner holds then is not in it.
+    marks_s: Vec<f32>,
 }
 
 /// Why a program would not come through.
@@ -49,34 +45,41 @@ fn told(trouble: &Trouble) -> String {
             format!("would be refused with error:{code} ({what}); {cure}")
         }
         Trouble::BeyondTravel { .. } => {
-            format!("would end in ALARM:2, for {trouble}; check the work zero against the program's size")
+            format!(
+                "would end in ALARM:2, for {trouble}; check the work zero against the program's size"
+            )
         }
     }
 }
 
 impl Rehearsed {
-    /// Time by the model when so many lines are answered, s: the controller's planner holds the last of them still.
-    pub fn seconds_at(&self, lines: usize) -> f64 {
-        let k = lines / MARK_LINES;
-        let Some(&mark_s) = self.marks_s.get(k).filter(|_| lines < self.lines) else {
-            return self.seconds;
-        };
-        let next_s = self.marks_s.get(k + 1).copied().unwrap_or(self.seconds);
-        let until = ((k + 1) * MARK_LINES).min(self.lines);
-        let part = (lines - k * MARK_LINES) as f64 / (until - k * MARK_LINES) as f64;
-        mark_s + (next_s - mark_s) * part
+    /// Time by the model when so many lines are answered, and at the latest when one more is, s: at that moment the
+    /// planner begins to run the oldest line that it holds.
+    pub fn span_s(&self, lines: usize) -> (f64, f64) {
+        let mark = |k: usize| k.checked_sub(1).map(|k| f64::from(self.marks_s[k]));
+        let lines = lines.min(self.marks_s.len());
+        let until = if lines < self.marks_s.len() { mark(lines) } else { Some(self.seconds) };
+        (mark(lines.saturating_sub(1)).unwrap_or(0.0), until.unwrap_or(0.0))
     }
 }
 
-/// Runs a program on the simulated controller, standing as the machine does. Nothing is sent.
+/// Runs a program on the simulated controller, standing as the machine does. Nothing is sent. With `baud` the time is
+/// that of lines which come over a serial line of this speed, bit/s.
 ///
 /// # Errors
 /// [`RehearseError`] for the first line that the controller would refuse.
-pub fn rehearse(script: &Script, standing: &Standing) -> Result<Rehearsed, RehearseError> {
+pub fn rehearse(
+    script: &Script,
+    standing: &Standing,
+    baud: Option<u32>,
+) -> Result<Rehearsed, RehearseError> {
     let refused = |at: Place| {
         move |refusal: Refusal| RehearseError { at, trouble: Trouble::Refused(refusal) }
     };
     let mut rehearsal = Rehearsal::new(standing).map_err(refused(Place::default()))?;
+    if let Some(baud) = baud {
+        rehearsal = rehearsal.supplied(f64::from(baud));
+    }
     let mut rehearsed = Rehearsed {
         seconds: 0.0,
         machine_extent: None,
@@ -86,14 +89,11 @@ pub fn rehearse(script: &Script, standing: &Standing) -> Result<Rehearsed, Rehea
         fastest_rpm: 0.0,
         first_pause: None,
         first_beyond: None,
-        lines: script.len(),
-        marks_s: Vec::with_capacity(script.len() / MARK_LINES + 1),
+        marks_s: Vec::with_capacity(script.len()),
     };
-    for (k, line) in script.lines().enumerate() {
-        if k % MARK_LINES == 0 {
-            rehearsed.marks_s.push(rehearsal.seconds());
-        }
+    for line in script.lines() {
         rehearsal.line(line.text).map_err(|trouble| RehearseError { at: line.place(), trouble })?;
+        rehearsed.marks_s.push(rehearsal.seconds() as f32);
         if rehearsal.pauses() && rehearsed.first_pause.is_none() {
             rehearsed.first_pause = Some(line.place());
         }

@@ -33,9 +33,12 @@ const BANNER_S: f64 = 2.0;
 
 /// What a session does besides sending.
 #[derive(Debug, Clone, Default)]
+#[allow(clippy::struct_excessive_bools, reason = "each is a wish of its own")]
 pub struct Options {
     /// The machine that the program was made for.
     pub profile: Option<Machine>,
+    /// Speed of the serial line, bit/s, if there is one: the time is foretold with it.
+    pub baud: Option<u32>,
     /// The zero is right: nobody is asked.
     pub zero_is_right: bool,
     /// The cutter stands at the zero: it is set there (G10 L20 P1).
@@ -277,7 +280,7 @@ pub fn run(
     let mut dialog = Dialog::new(link, commands);
     dialog.connect()?;
     let offset = dialog.clear()?;
-    dialog.to_idle(options.home, options.unlock)?;
+    dialog.make_idle(options.home, options.unlock)?;
     let mut zero_here = options.zero_here;
     let mut confirmed = options.zero_is_right || options.zero_here;
     let mut to_check = options.check_on_machine;
@@ -291,7 +294,8 @@ pub fn run(
             tell(Event::Connected { version: identity.version.clone() });
             confirmed &= options.zero_here || zero_is_kept(offset, &identity, tell);
         }
-        let rehearsed = rehearse(script, &identity.standing).map_err(SessionError::Rehearsal)?;
+        let rehearsed =
+            rehearse(script, &identity.standing, options.baud).map_err(SessionError::Rehearsal)?;
         fits(script, &identity, &rehearsed, options, first, tell)?;
         first = false;
         if std::mem::take(&mut to_check) {
@@ -433,7 +437,7 @@ fn check_on_machine(
     }
     dialog.ask("$C")?;
     dialog.lines_until(BANNER_S, |line| line.starts_with("Grbl"))?;
-    dialog.to_idle(false, false)?;
+    dialog.make_idle(false, false)?;
     tell(Event::CheckedOnMachine { lines: script.len() });
     Ok(())
 }
@@ -513,8 +517,13 @@ fn obey(command: Command, sender: &mut Sender, now_s: f64) -> Vec<u8> {
     match command {
         Command::Hold => sender.hold(),
         Command::Resume => sender.resume(),
-        Command::Toggle if held => sender.resume(),
-        Command::Toggle => sender.hold(),
+        Command::Toggle => {
+            if held {
+                sender.resume()
+            } else {
+                sender.hold()
+            }
+        }
         Command::Override(byte) => {
             sender.override_by(byte);
             Vec::new()

@@ -50,7 +50,7 @@ fn run_with(
     meddle: &mut dyn FnMut(&mut Sender, f64) -> Vec<u8>,
 ) -> (Outcome, Controller) {
     let script = script(text);
-    let rehearsed = rehearse(&script, &Standing::fresh(c.store().clone()));
+    let rehearsed = rehearse(&script, &Standing::fresh(c.store().clone()), None);
     let end_mm = rehearsed.map_or(None, |r| r.end_mm);
     let mut sender = Sender::new(script, 0.0).with_end(end_mm);
     let mut fault = fault;
@@ -69,8 +69,14 @@ fn run_with(
         assert_eq!(c.lost_bytes(), 0, "the ring was overfilled");
         if let Some(outcome) = sender.outcome() {
             let outcome = outcome.clone();
-            // What the machine holds when nobody can speak to it any more runs out.
-            c.advance(60.0);
+            // What the machine holds when nobody can speak to it any more runs out: 15 moves, the slowest of these
+            // tests take a quarter of a minute each.
+            c.advance(20.0);
+            for _ in 0..15 {
+                if c.is_in_motion() {
+                    c.advance(20.0);
+                }
+            }
             return (outcome, c);
         }
         c.advance(STEP_S);

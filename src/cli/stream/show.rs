@@ -49,27 +49,17 @@ impl Show {
             self.progress(progress, event);
             return;
         }
-        if let Event::ConfirmZero(_) = event
-            && self.form != Form::Terminal
-        {
-            // Whoever is asked looks at the terminal.
-            observe::complain(&words(event, self.keys));
+        self.clear();
+        if self.form == Form::Json {
+            json(event);
         }
-        match (self.form, event) {
-            (Form::Json, _) => json(event),
-            (_, Event::Warning { .. } | Event::Stopping { .. }) => {
-                self.clear();
-                observe::complain(&words(event, self.keys));
-            }
-            (Form::Quiet, _) | (Form::Lines, Event::ConfirmZero(_)) => {}
-            (Form::Terminal, Event::ConfirmZero(_)) => {
-                self.clear();
-                observe::complain(&words(event, self.keys));
-            }
-            _ => {
-                self.clear();
-                let _ = observe::say(&words(event, self.keys));
-            }
+        // Whoever is asked looks at the terminal, whatever becomes of the output.
+        let asks = matches!(event, Event::ConfirmZero(_));
+        let warns = matches!(event, Event::Warning { .. } | Event::Stopping { .. });
+        if asks || (warns && self.form != Form::Json) {
+            observe::complain(&words(event, self.keys));
+        } else if matches!(self.form, Form::Terminal | Form::Lines) {
+            let _ = observe::say(&words(event, self.keys));
         }
     }
 
@@ -159,29 +149,37 @@ fn columns() -> usize {
     79
 }
 
+/// What matters most comes first: a narrow terminal cuts the end off.
 fn line(p: &Progress) -> String {
     let percent = 100.0 * p.lines_done as f64 / p.lines.max(1) as f64;
-    let mut text = format!(
-        "{percent:3.0} %  {}  line {}, {} of {} lines, {} of {} kB  {} left",
-        p.state,
+    let mut text = format!("{percent:3.0} %  {}  ", p.state);
+    let names = ["feed", "rapids", "spindle"];
+    for (name, percent) in names.into_iter().zip(p.overrides) {
+        if percent != 100 {
+            let _ = write!(text, "{name} {percent} %  ");
+        }
+    }
+    let _ = write!(
+        text,
+        "line {} ({}/{})  {}/{} kB  {} left  F{:.0}",
         p.line,
         p.lines_done,
         p.lines,
         p.bytes_done / 1000,
         p.bytes / 1000,
-        clock(p.left_s.round()),
+        watch(p.left_s),
+        p.feed_mm_per_min
     );
     if let Some([x, y, z]) = p.work_mm {
         let _ = write!(text, "  X{x:.2} Y{y:.2} Z{z:.2}");
     }
-    let _ = write!(text, "  F{:.0}", p.feed_mm_per_min);
-    let names = ["feed", "rapids", "spindle"];
-    for (name, percent) in names.into_iter().zip(p.overrides) {
-        if percent != 100 {
-            let _ = write!(text, "  {name} {percent} %");
-        }
-    }
     text
+}
+
+/// `1:02:03`.
+fn watch(seconds: f64) -> String {
+    let s = seconds.round() as u64;
+    format!("{}:{:02}:{:02}", s / 3600, s / 60 % 60, s % 60)
 }
 
 fn words(event: &Event, keys: bool) -> String {

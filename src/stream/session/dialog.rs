@@ -107,7 +107,7 @@ impl<'a> Dialog<'a> {
     }
 
     /// Brings a locked machine to Idle if that was asked for; refuses every other state.
-    pub(super) fn to_idle(&mut self, home: bool, unlock: bool) -> Result<(), SessionError> {
+    pub(super) fn make_idle(&mut self, home: bool, unlock: bool) -> Result<(), SessionError> {
         let report = self.report(false)?;
         match report.state {
             State::Alarm | State::Idle if home => {

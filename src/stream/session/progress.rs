@@ -2,7 +2,7 @@
 
 use crate::controller::State;
 use crate::stream::rehearse::Rehearsed;
-use crate::stream::{Script, Sender};
+use crate::stream::{Report, Script, Sender};
 use std::collections::VecDeque;
 
 /// The pace of the machine against the model is taken over so long, s.
@@ -49,6 +49,8 @@ pub(super) struct Clockwork {
     worked_s: f64,
     /// That time, and the model's, at each look of the last minute.
     looks: VecDeque<(f64, f64)>,
+    /// Lines that were answered, and that time when the last of them was.
+    answered: (usize, f64),
     overrides: [u8; 3],
 }
 
@@ -59,6 +61,7 @@ impl Clockwork {
             last_s: begun_s,
             worked_s: 0.0,
             looks: VecDeque::from([(0.0, 0.0)]),
+            answered: (0, 0.0),
             overrides: [100; 3],
         }
     }
@@ -78,14 +81,19 @@ impl Clockwork {
         }
         self.last_s = now_s;
         let (lines_done, bytes_done) = sender.answered();
-        let model_s = rehearsed.seconds_at(lines_done);
+        if lines_done != self.answered.0 {
+            self.answered = (lines_done, self.worked_s);
+        }
+        // Between two answers the model goes on with the clock, up to where the next one is due.
+        let (from_s, until_s) = rehearsed.span_s(lines_done);
+        let model_s = (from_s + self.worked_s - self.answered.1).min(until_s);
         self.looks.push_back((self.worked_s, model_s));
         while self.looks.front().is_some_and(|(at_s, _)| self.worked_s - at_s > WINDOW_S) {
             self.looks.pop_front();
         }
         self.overrides = report.and_then(|r| r.overrides).unwrap_or(self.overrides);
         Progress {
-            state: report.map_or_else(String::new, |r| r.word()),
+            state: report.map_or_else(String::new, Report::word),
             line: sender.place().line,
             lines_done,
             lines: script.len(),

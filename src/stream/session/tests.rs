@@ -120,6 +120,21 @@ fn a_job_is_done_in_the_time_that_was_foretold() {
 }
 
 #[test]
+fn a_slow_wire_is_foretold() {
+    // Decimals that the firmware drops, and moves that are shorter than the time for their bytes.
+    let mut text = String::from("G1 F6000\n");
+    for k in 1..=300 {
+        text += &format!("G1 X{:.12} Y{:.12}\n", f64::from(k) * 0.2, 0.0);
+    }
+    let options = Options { baud: Some(115_200), ..yes() };
+    let store = quick(&[(120, 5000.0), (121, 5000.0)]);
+    let summary = session(store, &text, &options, vec![]).done.unwrap();
+    let wire_s = prepare(&text).unwrap().bytes() as f64 / 11_520.0;
+    assert!((summary.planned_s / wire_s - 1.0).abs() < 0.05, "{summary:?} {wire_s}");
+    assert!((summary.seconds - wire_s - 0.3).abs() < 0.3, "{summary:?} {wire_s}");
+}
+
+#[test]
 fn time_left_comes_down_to_zero_as_it_passes() {
     let mut text = String::from("G1 F600\n");
     for k in 0..300 {
@@ -226,15 +241,12 @@ fn what_the_answer_to_the_zero_is_counts() {
         });
         assert_eq!(asked, Some([10.0, 10.0, 5.0]));
         let at = bench.simulation.controller().position_mm().to_array();
-        match end {
-            Some(end) => {
-                assert!(done.is_ok(), "{done:?}");
-                assert_eq!(at, end);
-            }
-            None => {
-                assert_eq!(done, Err(SessionError::Asked));
-                assert_eq!(at, [10.0, 10.0, 5.0]);
-            }
+        if let Some(end) = end {
+            assert!(done.is_ok(), "{done:?}");
+            assert_eq!(at, end);
+        } else {
+            assert_eq!(done, Err(SessionError::Asked));
+            assert_eq!(at, [10.0, 10.0, 5.0]);
         }
     }
 }
