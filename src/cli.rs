@@ -11,6 +11,8 @@ mod memory;
 mod new;
 mod observe;
 mod outcome;
+mod ports;
+mod stream;
 mod time;
 
 use clap::{Parser, Subcommand};
@@ -18,6 +20,10 @@ use std::process::ExitCode;
 
 /// Exit code for bad input.
 const BAD_INPUT: u8 = 1;
+/// Exit code for a command that cannot be understood.
+const USAGE: u8 = 2;
+/// Exit code when the controller refused or was lost.
+const CONTROLLER: u8 = 3;
 /// Exit code when a check failed: gouge, envelope, rapid through stock.
 const CHECK_FAILED: u8 = 4;
 /// Exit code after Ctrl-C.
@@ -45,6 +51,10 @@ enum Command {
     New(new::Args),
     /// Tell how long a program takes on a machine, by GRBL's own planner
     Time(time::Args),
+    /// Send a program to a GRBL router, a network controller or the simulation, and watch over it
+    Stream(stream::Args),
+    /// List the serial ports and look which of them have a GRBL
+    Ports(ports::Args),
     /// Serve a simulated GRBL 1.1h on a pseudo-terminal
     #[cfg(unix)]
     Controller(controller::Args),
@@ -63,8 +73,14 @@ enum Command {
 enum Stop {
     /// Bad input, or a disk that refuses: exit code 1.
     Refused(anyhow::Error),
-    /// A check of the finished programs failed: exit code 4.
+    /// A check failed: exit code 4.
     CheckFailed(String),
+    /// The command line asks for what cannot be: exit code 2.
+    Usage(String),
+    /// The controller refused, or was lost: exit code 3.
+    Controller(String),
+    /// The user stopped it: exit code 130.
+    Interrupted(String),
 }
 
 impl<E: Into<anyhow::Error>> From<E> for Stop {
@@ -76,7 +92,10 @@ impl<E: Into<anyhow::Error>> From<E> for Stop {
 /// Runs the command that the arguments ask for.
 pub fn main() -> ExitCode {
     let cli = Cli::parse();
-    files::watch_signals();
+    // Those who talk to machines look after signals themselves.
+    if !matches!(cli.command, Command::Stream(_)) {
+        files::watch_signals();
+    }
     if let Some(n) = cli.threads {
         // Fails only when a pool exists already, and nothing has used one yet.
         let _ = rayon::ThreadPoolBuilder::new().num_threads(usize::from(n)).build_global();
@@ -86,6 +105,8 @@ pub fn main() -> ExitCode {
         Command::Check(args) => check::run(&args),
         Command::New(args) => new::run(&args),
         Command::Time(args) => time::run(&args),
+        Command::Stream(args) => stream::run(&args),
+        Command::Ports(args) => ports::run(&args),
         #[cfg(unix)]
         Command::Controller(args) => controller::run(&args),
         Command::Defaults => lists::defaults(),
@@ -103,11 +124,16 @@ pub fn main() -> ExitCode {
             observe::complain(&format!("{heading}{text}"));
             ExitCode::from(BAD_INPUT)
         }
-        Err(Stop::CheckFailed(text)) => {
-            observe::complain(&text);
-            ExitCode::from(CHECK_FAILED)
-        }
+        Err(Stop::CheckFailed(text)) => fail(&text, CHECK_FAILED),
+        Err(Stop::Usage(text)) => fail(&format!("error: {text}"), USAGE),
+        Err(Stop::Controller(text)) => fail(&format!("error: {text}"), CONTROLLER),
+        Err(Stop::Interrupted(text)) => fail(&text, INTERRUPTED),
     }
+}
+
+fn fail(text: &str, code: u8) -> ExitCode {
+    observe::complain(text);
+    ExitCode::from(code)
 }
 
 /// `relievo machines | head` closes the pipe early; that is no fault.

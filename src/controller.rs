@@ -15,6 +15,7 @@ mod commands;
 mod faults;
 mod modal;
 mod realtime;
+mod rehearse;
 mod report;
 mod run;
 mod store;
@@ -22,7 +23,8 @@ mod words;
 
 pub use code::Refusal;
 pub use faults::Fault;
-pub use store::Store;
+pub use rehearse::{Extent, Rehearsal, Standing, Trouble};
+pub use store::{Store, StoreError};
 
 use crate::geom::DVec3;
 use crate::motion::{Ring, Stepper};
@@ -188,6 +190,9 @@ pub struct Controller {
     probe_met: bool,
     faults: Faults,
     lost_bytes: u64,
+    /// Lines that were taken, in order.
+    #[cfg(test)]
+    pub(crate) obeyed: Vec<String>,
 }
 
 impl Controller {
@@ -227,6 +232,8 @@ impl Controller {
             probe_met: false,
             faults: Faults::default(),
             lost_bytes: 0,
+            #[cfg(test)]
+            obeyed: Vec::new(),
         };
         if std::mem::take(&mut controller.store.blank) {
             controller.say(&Refusal::EepromRead.to_string());
@@ -301,7 +308,7 @@ impl Controller {
     /// Sets the input pins. A limit switch stops everything when hard limits are on ($21).
     pub fn set_pins(&mut self, pins: Pins) {
         if pins.door && !self.pins.door {
-            self.flags.door = true;
+            self.open_door();
         }
         self.pins = pins;
         let watched = !matches!(self.state, State::Alarm | State::Home);
@@ -503,14 +510,23 @@ impl Controller {
         false
     }
 
-    fn begin_line(&mut self, line: &Line) {
-        let done = match line.text.as_slice() {
+    /// Checks a line and queues what it does.
+    fn take_up(&mut self, line: &Line) -> Result<(), Refusal> {
+        match line.text.as_slice() {
             _ if line.overflow => Err(Refusal::LineOverflow),
             [] => Ok(()),
             [b'$', ..] => self.command(&line.text),
             _ if matches!(self.state, State::Alarm | State::Jog) => Err(Refusal::Locked),
             text => self.obey(text),
-        };
+        }
+    }
+
+    fn begin_line(&mut self, line: &Line) {
+        let done = self.take_up(line);
+        #[cfg(test)]
+        if done.is_ok() && !line.text.is_empty() {
+            self.obeyed.push(String::from_utf8_lossy(&line.text).into_owned());
+        }
         match done {
             Ok(()) if self.tasks.is_empty() => self.say_ok(),
             Ok(()) => self.tasks.push_back(Task::Ok),

@@ -23,7 +23,7 @@
 //! | `gcode` | `gcode::write`: `Toolpath` -> text by dialect. `gcode::read`: text -> plain moves with line numbers. Neither imports the other | geom job toolpath (write only) |
 //! | `proof` | program text + job -> verdict (gouge, leftover, rapids, envelope, feeds, time) | geom job cutter relief stock motion `gcode::read` |
 //! | `controller` | a simulated GRBL 1.1 with its own strict line parser: bytes in, bytes out, virtual time; no I/O of its own | geom motion |
-//! | `stream` | program text -> bytes for the controller and when: the sender, a pure state machine without port or clock | job `gcode::read` motion proof controller |
+//! | `stream` | sending programs: the sender, a pure state machine without port or clock; links (serial, tcp, simulation) and the session that uses them | geom job `gcode::read` motion proof controller |
 //! | `report` | pictures (PNG), HTML report, mesh export, summaries | all above |
 //! | `cli` | one file per command; the only place with files, clock, terminal, fonts, ports | all |
 //!

@@ -66,8 +66,13 @@ pub struct Planner {
 impl Planner {
     /// A planner at rest whose lines are always there in time.
     pub fn new(machine: &Machine) -> Self {
+        Self::with_limits(Limits::from(machine))
+    }
+
+    /// The same for these settings.
+    pub fn with_limits(limits: Limits) -> Self {
         Self {
-            ring: Ring::new(Limits::from(machine)),
+            ring: Ring::new(limits),
             marks: VecDeque::new(),
             pushed: 0,
             by_move: None,
@@ -82,7 +87,13 @@ impl Planner {
 
     /// A planner at rest whose lines come over a serial line of this speed, bit/s, as [`Planner::line`] tells.
     pub fn with_baud(machine: &Machine, baud: f64) -> Self {
-        Self { supply: Some(Supply::new(baud)), ..Self::new(machine) }
+        Self::new(machine).supplied(baud)
+    }
+
+    /// The same whose lines come over a serial line of this speed, bit/s.
+    #[must_use]
+    pub fn supplied(self, baud: f64) -> Self {
+        Self { supply: Some(Supply::new(baud)), ..self }
     }
 
     /// Keeps the time of each move, too.
@@ -103,27 +114,40 @@ impl Planner {
 
     /// Adds a move; the oldest block leaves when the ring is full.
     pub fn push(&mut self, mv: &Move) {
+        // What is no number moves nothing.
+        let steps = if mv.from.is_finite() && mv.to.is_finite() {
+            let (from, to): ([i64; 3], [i64; 3]) =
+                [mv.from, mv.to].map(|p| self.ring.limits().steps(p)).into();
+            std::array::from_fn(|k| to[k] - from[k])
+        } else {
+            [0; 3]
+        };
+        let pace = match mv.kind {
+            MoveKind::Rapid => Pace::Rapid,
+            MoveKind::Feed { feed_mm_per_min } => Pace::Feed(feed_mm_per_min / 60.0),
+        };
+        self.push_steps(steps, pace, mv.line);
+    }
+
+    /// Adds a move of so many steps of each axis; the oldest block leaves when the ring is full.
+    pub fn push_steps(&mut self, steps: [i64; 3], pace: Pace, line: u32) {
         let number = self.pushed;
         self.pushed += 1;
         if let Some(seconds) = &mut self.by_move {
             seconds.push(0.0);
         }
-        if !(mv.from.is_finite() && mv.to.is_finite()) {
-            return;
-        }
-        let limits = self.ring.limits();
-        let (from, to) = (limits.steps(mv.from), limits.steps(mv.to));
-        let pace = match mv.kind {
-            MoveKind::Rapid => Pace::Rapid,
-            MoveKind::Feed { feed_mm_per_min } => Pace::Feed(feed_mm_per_min / 60.0),
-        };
-        let steps = std::array::from_fn(|k| to[k] - from[k]);
         if self.ring.push(steps, pace) {
-            self.marks.push_back((mv.line, number));
+            self.marks.push_back((line, number));
             if self.ring.is_full() {
                 self.settle_oldest();
             }
         }
+    }
+
+    /// New settings; the motion stops first.
+    pub fn set_limits(&mut self, limits: Limits) {
+        self.sync();
+        self.ring = Ring::new(limits);
     }
 
     /// Waits; the motion stops first.

@@ -1,13 +1,12 @@
 //! `relievo controller`: the simulated GRBL on a pseudo-terminal, for senders to try themselves on.
 
-use super::{Stop, files, observe};
+use super::{Stop, inputs, observe};
 use crate::controller::{Controller, Fault, Store};
-use anyhow::{Context, Result, anyhow, bail};
+use anyhow::{Context, Result};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::fs::{Mode, OFlags};
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
-use std::fmt::Write as _;
 use std::fs::File;
 use std::io::Write as _;
 use std::os::fd::OwnedFd;
@@ -27,7 +26,7 @@ const MOST_PENDING: usize = 1 << 20;
 
 The first line of output is the terminal's name. Ctrl-C ends it.")]
 pub(super) struct Args {
-    /// The EEPROM's settings, lines as $$ prints them; read at the start, written back when they change
+    /// The EEPROM: lines as $$, $N and $# print them; read at the start, written back when something changes
     #[arg(long, value_name = "FILE")]
     settings: Option<PathBuf>,
 
@@ -40,7 +39,7 @@ pub(super) struct Args {
     speed: f64,
 
     /// Let something go wrong at a time of the controller (s): drop-ok, garble-ok, split-ok, double-ok, banner,
-    /// silence, port-loss, slow-parser, tx-overrun
+    /// silence, port-loss, slow-parser, tx-overrun, eeprom-blackout, garble-line, no-switch
     #[arg(long = "fault", value_name = "FAULT@S", value_parser = fault)]
     faults: Vec<(f64, Fault)>,
 }
@@ -65,7 +64,7 @@ fn fault(text: &str) -> Result<(f64, Fault), String> {
 
 pub(super) fn run(args: &Args) -> Result<(), Stop> {
     let store = match &args.settings {
-        Some(path) if path.exists() => read_settings(path)?,
+        Some(path) if path.exists() => inputs::settings(path)?,
         _ => Store::default(),
     };
     let log = match &args.log {
@@ -128,43 +127,10 @@ fn note(log: &mut Option<File>, now_s: f64, way: char, bytes: &[u8]) -> Result<(
     writeln!(file, "{now_s:.6} {way} {}", bytes.escape_ascii()).context("cannot write the log")
 }
 
-fn read_settings(path: &Path) -> Result<Store> {
-    let mut store = Store::default();
-    let mut lines = Vec::new();
-    for (k, line) in files::read_text(path)?.lines().enumerate() {
-        let line = line.trim();
-        if line.is_empty() || line.starts_with('#') {
-            continue;
-        }
-        let fault =
-            || anyhow!("{}:{}: '{line}' is no setting; write $NUMBER=VALUE", path.display(), k + 1);
-        let (number, value) =
-            line.strip_prefix('$').and_then(|l| l.split_once('=')).ok_or_else(fault)?;
-        let number: u8 = number.trim().parse().map_err(|_| fault())?;
-        let value: f64 = value.trim().parse().map_err(|_| fault())?;
-        if !value.is_finite() {
-            bail!(fault());
-        }
-        lines.push((k, number, value));
-    }
-    // Homing first: soft limits are refused without it.
-    lines.sort_by_key(|(_, number, _)| *number != 22);
-    for (k, number, value) in lines {
-        store.set(number, value).map_err(|refusal| {
-            anyhow!("{}:{}: GRBL answers {refusal} to ${number}={value}", path.display(), k + 1)
-        })?;
-    }
-    Ok(store)
-}
-
 /// Writes the settings whole: under another name, then renamed.
 fn write_settings(path: &Path, store: &Store) -> Result<()> {
-    let mut text = String::new();
-    for (number, value) in store.settings() {
-        let _ = writeln!(text, "${number}={value}");
-    }
     let beside = path.with_extension("tmp");
-    std::fs::write(&beside, text)
+    std::fs::write(&beside, store.to_text())
         .and_then(|()| std::fs::rename(&beside, path))
         .with_context(|| format!("cannot write {}", path.display()))
 }

@@ -2,8 +2,9 @@
 
 use super::files;
 use crate::artwork::{Artwork, Fonts, is_picture, read_bitmap, read_svg};
-use crate::job::{ArtworkSpec, Draft, Library};
-use anyhow::{Context, Result, bail};
+use crate::controller::Store;
+use crate::job::{ArtworkSpec, Draft, Library, Machine};
+use anyhow::{Context, Result, anyhow, bail};
 use std::path::{Path, PathBuf};
 
 /// All that a command reads.
@@ -78,6 +79,33 @@ pub(super) fn library(folder: &Path) -> Result<Library> {
         library.overlay(&path.display().to_string(), &files::read_text(path)?)?;
     }
     Ok(library)
+}
+
+/// The EEPROM of a settings file.
+pub(super) fn settings(path: &Path) -> Result<Store> {
+    Store::from_text(&files::read_text(path)?)
+        .map_err(|e| anyhow!("{}:{}: {e}", path.display(), e.line()))
+}
+
+/// The machine of a name, or of a file.
+pub(super) fn machine(name: &str) -> Result<Machine> {
+    let path = Path::new(name);
+    if path.extension().is_some_and(|e| e == "toml") {
+        let mut library = Library::built_in();
+        library.overlay(name, &files::read_text(path)?)?;
+        let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+        return library.machine(&stem).cloned().ok_or_else(|| {
+            anyhow!("{name} holds no machine named '{stem}'; give the file the name that it states")
+        });
+    }
+    let library = library(Path::new(""))?;
+    library.machine(name).cloned().ok_or_else(|| {
+        let names: Vec<_> = library.machines().map(|m| m.name.as_str()).collect();
+        anyhow!(
+            "there is no machine '{name}'; choose one of {}, or give a .toml file",
+            names.join(", ")
+        )
+    })
 }
 
 /// Scanning the system's fonts takes long: it is done only for artwork that may hold text.

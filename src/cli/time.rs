@@ -3,11 +3,10 @@
 use super::{Stop, files, inputs, observe};
 use crate::gcode::read;
 use crate::geom::DVec3;
-use crate::job::{Library, Machine};
 use crate::motion::{Planner, Times};
 use crate::proof;
-use anyhow::{Context, Result, anyhow};
-use std::path::{Path, PathBuf};
+use anyhow::Context;
+use std::path::PathBuf;
 
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
@@ -45,7 +44,7 @@ struct Told {
 }
 
 pub(super) fn run(args: &Args) -> Result<(), Stop> {
-    let machine = machine(&args.machine)?;
+    let machine = inputs::machine(&args.machine)?;
     let text = files::read_text(&args.program)?;
     let program = read::read(&text, &machine, DVec3::ZERO)
         .with_context(|| args.program.display().to_string())?;
@@ -86,29 +85,8 @@ pub(super) fn run(args: &Args) -> Result<(), Stop> {
     Ok(observe::say(&text)?)
 }
 
-/// The machine of a name, or of a file.
-fn machine(name: &str) -> Result<Machine> {
-    let path = Path::new(name);
-    if path.extension().is_some_and(|e| e == "toml") {
-        let mut library = Library::built_in();
-        library.overlay(name, &files::read_text(path)?)?;
-        let stem = path.file_stem().unwrap_or_default().to_string_lossy();
-        return library.machine(&stem).cloned().ok_or_else(|| {
-            anyhow!("{name} holds no machine named '{stem}'; give the file the name that it states")
-        });
-    }
-    let library = inputs::library(Path::new(""))?;
-    library.machine(name).cloned().ok_or_else(|| {
-        let names: Vec<_> = library.machines().map(|m| m.name.as_str()).collect();
-        anyhow!(
-            "there is no machine '{name}'; choose one of {}, or give a .toml file",
-            names.join(", ")
-        )
-    })
-}
-
 /// `1 h 02 min 03.4 s`.
-fn clock(seconds: f64) -> String {
+pub(super) fn clock(seconds: f64) -> String {
     let tenths = (seconds * 10.0).round() as u64;
     let (h, min, s) = (tenths / 36_000, tenths / 600 % 60, tenths % 600);
     let s = format!("{}.{} s", s / 10, s % 10);

@@ -52,6 +52,9 @@ pub(super) enum Alarm {
     ProbeInitial = 4,
     ProbeContact = 5,
     HomingReset = 6,
+    HomingDoor = 7,
+    HomingPullOff = 8,
+    HomingApproach = 9,
 }
 
 impl Alarm {

@@ -11,6 +11,9 @@ const SPLIT_S: f64 = 0.3;
 /// Lines that a slow parser gets through, 1/s (GRBL is reliable at this rate).
 const SLOW_LINES_PER_S: f64 = 250.0;
 
+/// Bytes that an EEPROM write nobody asked for takes: a position with its checksum.
+const BLACKOUT_BYTES: usize = 13;
+
 /// Something that goes wrong.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
@@ -33,6 +36,12 @@ pub enum Fault {
     SlowParser,
     /// From now on what the transmit ring cannot hold is lost.
     TxOverrun,
+    /// Interrupts are off for as long as an EEPROM write of 13 bytes takes: what comes over the wire meanwhile is lost.
+    EepromBlackout,
+    /// The next digit that comes is another character: the line is refused.
+    GarbleLine,
+    /// The limit switches are unplugged: homing finds none.
+    NoSwitch,
 }
 
 impl Fault {
@@ -47,16 +56,22 @@ impl Fault {
         ("port-loss", Self::PortLoss),
         ("slow-parser", Self::SlowParser),
         ("tx-overrun", Self::TxOverrun),
+        ("eeprom-blackout", Self::EepromBlackout),
+        ("garble-line", Self::GarbleLine),
+        ("no-switch", Self::NoSwitch),
     ];
 }
 
 /// The faults in force.
 #[derive(Debug, Clone, Default)]
+#[allow(clippy::struct_excessive_bools, reason = "each goes wrong by itself")]
 pub(super) struct Faults {
     next_ok: Option<Fault>,
     silent: bool,
     pub(super) unplugged: bool,
     overrun: bool,
+    garble_digit: bool,
+    no_switch: bool,
     /// Bytes in the transmit ring at a time, s.
     sending: (f64, f64),
     /// Until when what is said is held back, s.
@@ -84,8 +99,19 @@ impl Controller {
             }
             Fault::SlowParser => self.line_s = 1.0 / SLOW_LINES_PER_S,
             Fault::TxOverrun => self.faults.overrun = true,
+            Fault::EepromBlackout => self.wrote(BLACKOUT_BYTES),
+            Fault::GarbleLine => self.faults.garble_digit = true,
+            Fault::NoSwitch => self.faults.no_switch = true,
         }
         self.poll();
+    }
+
+    /// A byte as it arrives: what a fault makes of it.
+    pub(super) fn arriving(&mut self, byte: u8) -> u8 {
+        if byte.is_ascii_digit() && std::mem::take(&mut self.faults.garble_digit) {
+            return b'#';
+        }
+        byte
     }
 
     /// Says `ok`, or what a fault makes of it.
@@ -124,6 +150,10 @@ impl Controller {
             }
         }
         f.sending = (level, self.now_s);
+    }
+
+    pub(super) fn has_no_switches(&self) -> bool {
+        self.faults.no_switch
     }
 
     /// When held bytes are to go, s.

@@ -23,6 +23,9 @@ const COOLANT_RESTORE_S: f64 = 1.0;
 /// The axes of each homing cycle: Z alone, then X and Y.
 const HOMING_CYCLES: [[usize; 3]; 2] = [[2, 2, 2], [0, 1, 1]];
 
+/// How far a switch is searched, as a multiple of the travel.
+const HOMING_SEARCH: f64 = 1.5;
+
 /// What realtime bytes have asked for; each is one bit, so that repetition is lost until it is served.
 #[derive(Debug, Clone, Copy, Default)]
 #[allow(clippy::struct_excessive_bools, reason = "the firmware's flag bits")]
@@ -48,7 +51,7 @@ impl Controller {
             b'?' => self.flags.status = true,
             b'!' => self.flags.hold = true,
             b'~' => self.flags.start = true,
-            0x84 => self.flags.door = true,
+            0x84 => self.open_door(),
             0x85 => self.flags.cancel |= self.state == State::Jog,
             0x90..=0xA0 => {
                 if self.flags.overrides == 0 {
@@ -57,8 +60,25 @@ impl Controller {
                 self.flags.overrides |= 1 << (byte - 0x90);
             }
             0x80.. => {}
-            _ => self.receive(byte),
+            _ => {
+                let byte = self.arriving(byte);
+                self.receive(byte);
+            }
         }
+    }
+
+    /// The door's pin or byte.
+    pub(super) fn open_door(&mut self) {
+        if self.state == State::Home {
+            self.fail_homing(Alarm::HomingDoor);
+        } else {
+            self.flags.door = true;
+        }
+    }
+
+    fn fail_homing(&mut self, alarm: Alarm) {
+        self.request_reset();
+        self.alarm = Some(alarm);
     }
 
     /// When something here wants to be looked at again, s.
@@ -315,6 +335,13 @@ impl Controller {
         let pull_off = self.store.get(27);
         let at = self.position_mm();
         let mut seconds = 0.0;
+        if self.has_no_switches() {
+            // The search goes on for one and a half times the travel of the first axis.
+            let way = HOMING_SEARCH * self.store.axes(130).z;
+            let lost = [Task::Wait(way / seek.max(1e-3)), Task::Then(After::HomingLost)];
+            self.tasks.extend(lost);
+            return;
+        }
         for axes in HOMING_CYCLES {
             let way = axes.iter().map(|&k| (self.switch_mm(k) - at[k]).abs()).fold(0.0, f64::max);
             seconds += (way + pull_off) / seek.max(1e-3) + 2.0 * pull_off / locate.max(1e-3);
@@ -330,7 +357,17 @@ impl Controller {
         if negative { -self.store.axes(130)[axis] } else { 0.0 }
     }
 
+    /// No switch was met.
+    pub(super) fn homing_lost(&mut self) {
+        self.fail_homing(Alarm::HomingApproach);
+    }
+
     pub(super) fn homed(&mut self) {
+        if self.pins.limits.contains(&true) {
+            // Pulled off, and still a switch is triggered.
+            self.fail_homing(Alarm::HomingPullOff);
+            return;
+        }
         let pull_off = self.store.get(27);
         let mut at = self.position_mm();
         for k in 0..3 {

@@ -63,6 +63,7 @@ pub(super) enum After {
     End,
     StoreStartup(usize, String),
     Homed,
+    HomingLost,
 }
 
 /// Bytes of a position with its checksum.
@@ -262,7 +263,7 @@ impl Controller {
         to.cmplt(low).any() || to.cmpgt(DVec3::ZERO).any()
     }
 
-    fn change(&mut self, after: After) {
+    pub(super) fn change(&mut self, after: After) {
         match after {
             After::Spindle(spindle, rpm) => {
                 if self.state != State::Check {
@@ -313,6 +314,7 @@ impl Controller {
                 }
             }
             After::Homed => self.homed(),
+            After::HomingLost => self.homing_lost(),
         }
     }
 

@@ -1,5 +1,9 @@
 //! The EEPROM: settings, coordinate systems, startup lines, build info.
 
+mod text;
+
+pub use text::StoreError;
+
 use super::code::Refusal;
 use crate::geom::DVec3;
 use crate::motion::Limits;

@@ -137,6 +137,151 @@ fn homing_ends_at_the_pull_off() {
 }
 
 #[test]
+fn homing_that_fails_says_why() {
+    let homing = || {
+        let mut store = Store::default();
+        store.set(22, 1.0).unwrap();
+        let mut c = Controller::new(store);
+        c.advance(0.1);
+        c.take_output();
+        c
+    };
+    let door = Pins { door: true, ..Pins::default() };
+    let stuck = Pins { limits: [true, false, false], ..Pins::default() };
+    for alarm in ["ALARM:6", "ALARM:7", "ALARM:8", "ALARM:9"] {
+        let mut c = homing();
+        if alarm == "ALARM:9" {
+            c.inject(Fault::NoSwitch);
+        }
+        after(&mut c, b"$H\n", 0.5);
+        match alarm {
+            "ALARM:6" => c.feed(b"\x18"),
+            "ALARM:7" => c.set_pins(door),
+            "ALARM:8" => c.set_pins(stuck),
+            _ => {}
+        }
+        let said = after(&mut c, b"", 200.0);
+        assert!(said.starts_with(&format!("{alarm}\r\n")), "{said}");
+        assert!(said.contains("Grbl 1.1h"), "{said}");
+        assert_eq!(c.state(), State::Alarm);
+    }
+}
+
+#[test]
+fn the_eeprom_goes_through_text_and_back() {
+    let mut c = quick();
+    for line in ["$N1=G21 F5", "G10 L2 P3 X1.5 Y-2 Z3.25", "G53 G0 X4", "G30.1", "$11=0.02"] {
+        assert_eq!(after(&mut c, format!("{line}\n").as_bytes(), 3.0), "ok\r\n", "{line}");
+    }
+    let text = c.store().to_text();
+    for line in ["$N1=G21F5\n", "[G56:1.5000,-2.0000,3.2500]\n", "[G30:4.0000,", "$11=0.02\n"] {
+        assert!(text.contains(line), "{line} {text}");
+    }
+    let again = Store::from_text(&text).unwrap();
+    assert_eq!(&again, c.store());
+    // What the firmware itself prints is read as well; inches when it says so.
+    let printed = "$13=1\n$100=250.000 (x, step/mm)\n[G54:1.0000,0.0000,-0.5000]\n# note\n";
+    let store = Store::from_text(printed).unwrap();
+    assert_eq!(store.system(0), DVec3::new(25.4, 0.0, -12.7));
+    for (bad, line) in
+        [("$1=\n", 1), ("\n[G54:1,2]\n", 2), ("$0=1\n", 1), ("hello", 1), ("$400=1", 1)]
+    {
+        assert_eq!(Store::from_text(bad).unwrap_err().line(), line, "{bad}");
+    }
+}
+
+#[test]
+fn a_rehearsal_says_what_the_controller_would() {
+    let standing = Standing::fresh(quick().store().clone());
+    let mut rehearsal = Rehearsal::new(&standing).unwrap();
+    for line in
+        ["G21G91", "G1X10F600", "G20X1", "G2X1Y1R1F20", "M3S500", "G4P2", "G28.1", "G10L20P1X0"]
+    {
+        assert_eq!(rehearsal.line(line), Ok(()), "{line}");
+    }
+    assert_eq!(rehearsal.line("G0Q1"), Err(Trouble::Refused(Refusal::Unsupported)));
+    assert_eq!(rehearsal.end_mm(), Some(DVec3::new(10.0 + 50.8, 25.4, 0.0)));
+    assert_eq!(rehearsal.work_position_mm(), DVec3::new(0.0, 25.4, 0.0));
+    assert!(!rehearsal.pauses());
+    rehearsal.line("M0").unwrap();
+    assert!(rehearsal.pauses());
+    // Homing leaves the end to the machine.
+    rehearsal.line("G38.3Z-1F100").unwrap();
+    assert_eq!(rehearsal.end_mm(), None);
+}
+
+#[test]
+fn a_rehearsal_begins_as_the_machine_stands() {
+    let mut store = quick().store().clone();
+    store.set(22, 1.0).unwrap();
+    store.set(20, 1.0).unwrap();
+    let standing = Standing {
+        position_mm: DVec3::new(-50.0, -60.0, -5.0),
+        modes: "G1 G54 G17 G20 G91 G94 M5 M9 T3 F254 S12000".into(),
+        offset_mm: DVec3::X * -40.0,
+        ..Standing::fresh(store)
+    };
+    let mut rehearsal = Rehearsal::new(&standing).unwrap();
+    assert_eq!(rehearsal.work_position_mm(), DVec3::new(-10.0, -60.0, -5.0));
+    // G1, inches, incremental, and a feed are in force.
+    rehearsal.line("X1").unwrap();
+    assert_eq!(rehearsal.end_mm(), Some(DVec3::new(-24.6, -60.0, -5.0)));
+    let trouble = rehearsal.line("X1").unwrap_err();
+    let Trouble::BeyondTravel { axis: 'X', at_mm, travel_mm: 200.0 } = trouble else {
+        panic!("{trouble}")
+    };
+    assert!((at_mm - 0.8).abs() < 1e-9);
+}
+
+proptest! {
+    /// Lines of G-code: what the rehearsal takes and refuses is what the running controller takes and refuses, and both
+    /// end at the same place.
+    #[test]
+    fn rehearsal_and_run_agree(
+        lines in prop::collection::vec(
+            prop::collection::vec(("[GXYZIJKRFPLNSTM]", -3i32..40), 1..5), 1..8),
+    ) {
+        let standing = Standing::fresh(quick().store().clone());
+        let mut rehearsal = Rehearsal::new(&standing).unwrap();
+        let mut c = quick();
+        for words in lines {
+            let mut line = String::new();
+            for (letter, value) in words {
+                // Feeds at which something gets done.
+                let value = if letter == "F" { value * 100 } else { value };
+                line += &format!("{letter}{value}");
+            }
+            let mut said = after(&mut c, format!("{line}\n").as_bytes(), 0.1);
+            for _ in 0..10_000 {
+                if said.contains("ok") || said.contains("error") {
+                    break;
+                }
+                // Goes on after M0.
+                said += &after(&mut c, b"~", 1.0);
+            }
+            if line.contains("G38") {
+                // Where a probe ends the machine alone knows.
+                return Ok(());
+            }
+            let expected = match rehearsal.line(&line) {
+                Ok(()) => "ok\r\n".to_string(),
+                Err(trouble) => format!("{trouble}\r\n"),
+            };
+            prop_assert!(said.ends_with(&expected), "{}: {:?} {:?}", line, said, expected);
+            // An EEPROM write is over.
+            c.advance(0.1);
+        }
+        for _ in 0..10_000 {
+            if c.state() == State::Idle && !c.is_in_motion() {
+                break;
+            }
+            c.advance(1.0);
+        }
+        prop_assert_eq!(Some(c.position_mm()), rehearsal.end_mm());
+    }
+}
+
+#[test]
 fn a_probe_stops_at_the_plate() {
     let mut c = quick();
     c.set_plate(Some(-3.0));

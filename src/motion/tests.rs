@@ -55,7 +55,9 @@ fn the_times_of_the_moves_are_the_time_of_the_whole() {
     moves.insert(20, feed(at(20), at(20) + DVec3::X * 1e-5, 1200.0));
     moves[7].kind = MoveKind::Rapid;
     let mut planner = Planner::new(&machine()).recording();
-    moves.iter().for_each(|m| planner.push(m));
+    for m in &moves {
+        planner.push(m);
+    }
     planner.sync();
     let by_move = planner.seconds_by_move();
     assert_eq!((by_move.len(), by_move[20]), (moves.len(), 0.0));

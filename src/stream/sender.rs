@@ -1,10 +1,15 @@
 //! The sender: what was heard and the time -> what to say.
 
-use super::{Line, StreamError};
-use std::collections::VecDeque;
+mod answers;
+mod deeds;
 
-/// Bytes that the controller's receive ring holds.
-const RING_BYTES: usize = 128;
+use super::{Place, Report, Script, StreamError};
+use crate::geom::DVec3;
+use std::collections::VecDeque;
+use std::sync::Arc;
+
+/// Bytes that the controller's receive ring holds, unless it tells otherwise.
+pub const RING_BYTES: usize = 128;
 
 /// Time between two status requests, s (at most five a second).
 const STATUS_S: f64 = 0.2;
@@ -24,8 +29,35 @@ const STOP_S: f64 = 20.0;
 /// How long the banner may take after a reset, s.
 const BANNER_S: f64 = 2.0;
 
+/// Between two override bytes, s: the controller keeps them as flag bits, so that a burst counts once.
+const OVERRIDE_S: f64 = 0.05;
+
+/// Most override bytes that wait.
+const MOST_OVERRIDES: usize = 32;
+
+/// Bytes by which builds disagree on how large an empty ring is.
+const RING_SLACK: usize = 2;
+
+/// Longest line that any GRBL says, bytes; a longer one is noise.
+const LONGEST_HEARD: usize = 1024;
+
+/// Most messages kept for whoever shows them.
+const MOST_MESSAGES: usize = 64;
+
+/// How far the machine may stand from where the job ends, mm: a step, and the decimals of an inch report.
+const END_MM: f64 = 0.02;
+
+/// Reports in a row that must agree before rest is believed: the first may be older than what was said last.
+const SURE: u32 = 2;
+
 /// Drains the planner before the end is believed.
 const DRAIN: &str = "G4P0.01";
+
+/// A question whose answer cannot be mistaken: `[GC:...]` must come right before its `ok`, or answers were lost or
+/// doubled. It is asked before each line that writes the EEPROM, and now and then.
+const SYNC: &str = "$G";
+const SYNC_ANSWER: &str = "[GC:";
+const SYNC_S: f64 = 2.0;
 
 /// How it ended.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -33,35 +65,85 @@ pub enum Outcome {
     /// Every line was answered and the machine rests.
     Done,
     /// The machine was stopped, or nothing more can be done about it.
-    Stopped(StreamError),
+    Stopped {
+        /// Why.
+        why: StreamError,
+        /// How the machine was left.
+        rest: Rest,
+    },
+}
+
+/// How a stop left the machine.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Rest {
+    /// It came to rest and was reset then: position and zero are kept.
+    Kept,
+    /// The reset came while it moved: the position is lost.
+    Lost,
+    /// Nothing was heard: it may still run what it holds.
+    Unknown,
+}
+
+/// What is sent, and what the end looks like.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Purpose {
+    /// The job: it ends at Idle.
+    Work,
+    /// A check by the controller itself ($C): it ends in check mode.
+    Check,
 }
 
 #[derive(Debug, Clone, PartialEq)]
 enum Phase {
     Sending,
-    /// All is answered; Idle was said so many times.
+    /// All is answered; rest was reported so many times.
     Ending(u32),
-    /// `!` is out since a time; waiting for rest.
+    /// `!` is out since a time; waiting for rest, reported so many times.
     Braking {
         why: StreamError,
         since_s: f64,
+        times: u32,
     },
     /// 0x18 is out since a time; waiting for the banner.
     Resetting {
         why: StreamError,
         since_s: f64,
+        rest: Rest,
     },
     Over(Outcome),
+}
+
+/// What a line on its way is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    Program,
+    Drain,
+    Sync,
+}
+
+/// A line on its way.
+#[derive(Debug, Clone, Copy)]
+struct Sent {
+    kind: Kind,
+    k: usize,
+    bytes: usize,
+    alone: bool,
+    homing: bool,
+    dwell_s: f64,
 }
 
 /// Sends one program.
 #[derive(Debug, Clone)]
 pub struct Sender {
-    lines: Vec<Line>,
+    script: Arc<Script>,
+    purpose: Purpose,
     next: usize,
     /// Lines without an answer, and their bytes.
-    unanswered: VecDeque<usize>,
+    unanswered: VecDeque<Sent>,
     unanswered_bytes: usize,
+    answered: usize,
+    answered_bytes: u64,
+    ring_bytes: usize,
     /// Most bytes that may be unanswered: one answer too many does not overfill the ring either.
     window: usize,
     phase: Phase,
@@ -72,27 +154,86 @@ pub struct Sender {
     heard_s: f64,
     /// Since when the controller says Idle without answering, s.
     idle_since_s: Option<f64>,
+    inches: bool,
+    report: Option<Report>,
+    reports: u64,
+    /// Offset from machine to work coordinates, as last told, mm.
+    offset_mm: Option<DVec3>,
+    end_mm: Option<DVec3>,
+    messages: Vec<String>,
+    overrides: VecDeque<u8>,
+    override_s: f64,
+    /// The answer to [`SYNC`] has come, its `ok` not yet.
+    sync_heard: bool,
+    /// No line was sent since the last one in step.
+    in_step: bool,
+    synced_s: f64,
 }
 
 impl Sender {
-    /// A sender of prepared lines to a controller that is idle.
-    pub fn new(mut lines: Vec<Line>, now_s: f64) -> Self {
-        let number = lines.last().map_or(0, |l| l.number);
-        lines.push(Line { number, text: DRAIN.into(), alone: false, dwell_s: 0.01 });
-        let longest = lines.iter().map(Line::bytes).max().unwrap_or(0);
-        Self {
-            window: RING_BYTES.saturating_sub(longest).max(longest),
-            lines,
+    /// A sender of a program to a controller that is idle.
+    pub fn new(script: Arc<Script>, now_s: f64) -> Self {
+        let mut sender = Self {
+            script,
+            purpose: Purpose::Work,
             next: 0,
             unanswered: VecDeque::new(),
             unanswered_bytes: 0,
+            answered: 0,
+            answered_bytes: 0,
+            ring_bytes: RING_BYTES,
+            window: 0,
             phase: Phase::Sending,
             heard: Vec::new(),
             rest_until_s: now_s,
             asked_s: now_s,
             heard_s: now_s,
             idle_since_s: None,
-        }
+            inches: false,
+            report: None,
+            reports: 0,
+            offset_mm: None,
+            end_mm: None,
+            messages: Vec::new(),
+            overrides: VecDeque::new(),
+            override_s: now_s,
+            sync_heard: false,
+            in_step: false,
+            synced_s: now_s,
+        };
+        sender.set_ring(RING_BYTES);
+        sender
+    }
+
+    /// The same for another purpose.
+    #[must_use]
+    pub fn with_purpose(self, purpose: Purpose) -> Self {
+        Self { purpose, ..self }
+    }
+
+    /// The same for a controller with a receive ring of so many bytes. Longer rings than GRBL's are not used.
+    #[must_use]
+    pub fn with_ring(mut self, bytes: usize) -> Self {
+        self.set_ring(bytes.min(RING_BYTES));
+        self
+    }
+
+    /// The same for a controller that reports in inches ($13=1).
+    #[must_use]
+    pub fn with_inches(self, inches: bool) -> Self {
+        Self { inches, ..self }
+    }
+
+    /// The same for a program that must end at this place, machine coordinates, mm: if it does not, bytes were lost.
+    #[must_use]
+    pub fn with_end(self, end_mm: Option<DVec3>) -> Self {
+        Self { end_mm, ..self }
+    }
+
+    fn set_ring(&mut self, bytes: usize) {
+        let longest = self.script.longest().max(DRAIN.len() + 1);
+        self.ring_bytes = bytes;
+        self.window = bytes.saturating_sub(longest).max(longest);
     }
 
     /// How it ended; `None` while it goes on.
@@ -103,28 +244,115 @@ impl Sender {
         }
     }
 
+    /// Why it is being stopped, or was.
+    pub fn fault(&self) -> Option<&StreamError> {
+        match &self.phase {
+            Phase::Braking { why, .. }
+            | Phase::Resetting { why, .. }
+            | Phase::Over(Outcome::Stopped { why, .. }) => Some(why),
+            _ => None,
+        }
+    }
+
     /// Bytes that are sent and not answered.
     pub fn unanswered_bytes(&self) -> usize {
         self.unanswered_bytes
     }
 
-    /// Lines that are sent, of all.
-    pub fn sent(&self) -> (usize, usize) {
-        (self.next, self.lines.len())
+    /// Lines and bytes of the program that are answered.
+    pub fn answered(&self) -> (usize, u64) {
+        (self.answered.min(self.script.len()), self.answered_bytes.min(self.script.bytes()))
     }
 
-    /// The user wants it to stop.
+    /// Lines that are sent.
+    pub fn sent(&self) -> usize {
+        self.next.min(self.script.len())
+    }
+
+    /// The last status report.
+    pub fn report(&self) -> Option<&Report> {
+        self.report.as_ref()
+    }
+
+    /// How many status reports there were.
+    pub fn reports(&self) -> u64 {
+        self.reports
+    }
+
+    /// Position in the coordinates of the work, mm, as far as it was told.
+    pub fn work_mm(&self) -> Option<DVec3> {
+        let report = self.report?;
+        match (report.work_mm, report.machine_mm) {
+            (Some(work), _) => Some(work),
+            (None, machine) => Some(machine? - self.offset_mm?),
+        }
+    }
+
+    /// Position in machine coordinates, mm, as far as it was told.
+    pub fn machine_mm(&self) -> Option<DVec3> {
+        let report = self.report?;
+        match (report.machine_mm, report.work_mm) {
+            (Some(machine), _) => Some(machine),
+            (None, work) => Some(work? + self.offset_mm?),
+        }
+    }
+
+    /// Takes what the controller said in `[MSG:...]` and the like.
+    pub fn take_messages(&mut self) -> Vec<String> {
+        std::mem::take(&mut self.messages)
+    }
+
+    /// The place in the program that is being worked on: the oldest line without an answer, else the last one.
+    pub fn place(&self) -> Place {
+        let k = self.unanswered.front().map_or(self.next, |sent| sent.k);
+        let k = k.min(self.script.len().saturating_sub(1));
+        self.script.line(k).map_or_else(Place::default, |line| line.place())
+    }
+
+    /// The user wants it to stop: what to say.
     pub fn stop(&mut self, now_s: f64) -> Vec<u8> {
-        let line = self.about();
-        self.brake(StreamError::Asked { line }, now_s)
+        let at = self.place();
+        self.brake(StreamError::Asked { at }, now_s)
+    }
+
+    /// The user wants it to stop at once, whatever becomes of the position: what to say.
+    pub fn abort(&mut self, now_s: f64) -> Vec<u8> {
+        let rests = self.report.is_some_and(|r| r.is_at_rest());
+        let why = match &self.phase {
+            Phase::Over(_) | Phase::Resetting { .. } => return Vec::new(),
+            Phase::Braking { why, .. } => why.clone(),
+            Phase::Sending | Phase::Ending(_) => StreamError::Asked { at: self.place() },
+        };
+        let rest = if rests { Rest::Kept } else { Rest::Lost };
+        self.phase = Phase::Resetting { why, since_s: now_s, rest };
+        vec![0x18]
+    }
+
+    /// The user wants it to pause: what to say.
+    pub fn hold(&mut self) -> Vec<u8> {
+        if self.works() { b"!".to_vec() } else { Vec::new() }
+    }
+
+    /// The user wants it to go on after a pause: what to say.
+    pub fn resume(&mut self) -> Vec<u8> {
+        if self.works() { b"~".to_vec() } else { Vec::new() }
+    }
+
+    /// A realtime byte for an override (0x90 to 0x9D): it is said when the ones before it have been heard.
+    pub fn override_by(&mut self, byte: u8) {
+        if self.overrides.len() < MOST_OVERRIDES && (0x90..=0x9D).contains(&byte) {
+            self.overrides.push_back(byte);
+        }
     }
 
     /// The port is gone: nothing more can be said.
     pub fn port_lost(&mut self) {
-        let line = self.about();
-        if self.outcome().is_none() {
-            self.phase = Phase::Over(Outcome::Stopped(StreamError::PortLost { line }));
-        }
+        let why = match &self.phase {
+            Phase::Over(_) => return,
+            Phase::Braking { why, .. } | Phase::Resetting { why, .. } => why.clone(),
+            _ => StreamError::PortLost { at: self.place() },
+        };
+        self.phase = Phase::Over(Outcome::Stopped { why, rest: Rest::Unknown });
     }
 
     /// What to say now, after `heard` came. To be called at least each 50 ms.
@@ -134,7 +362,7 @@ impl Sender {
             self.heard_s = now_s;
         }
         for &byte in heard {
-            if byte == b'\n' {
+            if byte == b'\n' || self.heard.len() >= LONGEST_HEARD {
                 let line = std::mem::take(&mut self.heard);
                 let text = String::from_utf8_lossy(&line).trim().to_string();
                 say.extend(self.listen(&text, now_s));
@@ -147,158 +375,20 @@ impl Sender {
             self.asked_s = now_s;
             say.push(b'?');
         }
+        if self.works()
+            && now_s - self.override_s >= OVERRIDE_S
+            && let Some(byte) = self.overrides.pop_front()
+        {
+            self.override_s = now_s;
+            say.push(byte);
+        }
         if self.phase == Phase::Sending {
             self.send(now_s, &mut say);
         }
         say
     }
 
-    /// The oldest line without an answer, else the last one.
-    fn about(&self) -> u32 {
-        let at = self.unanswered.front().copied().unwrap_or(self.next);
-        self.lines.get(at).or(self.lines.last()).map_or(0, |l| l.number)
-    }
-
-    /// One line from the controller.
-    fn listen(&mut self, text: &str, now_s: f64) -> Vec<u8> {
-        let number = |rest: &str| rest.trim().parse::<u16>().unwrap_or(0);
-        if text.starts_with("Grbl ") {
-            return self.banner(now_s);
-        }
-        let working = matches!(self.phase, Phase::Sending | Phase::Ending(_));
-        if let Some(status) = text.strip_prefix('<') {
-            return self.status(status, now_s);
-        }
-        if text.is_empty() || (text.starts_with('[') && text.ends_with(']')) || !working {
-            return Vec::new();
-        }
-        let line = self.about();
-        if text == "ok" {
-            return self.answered(now_s);
-        }
-        let why = if let Some(code) = text.strip_prefix("error:") {
-            let at = self.unanswered.front().copied().unwrap_or(self.next);
-            let text = self.lines.get(at).map_or_else(String::new, |l| l.text.clone());
-            StreamError::Refused { line, text, code: number(code) }
-        } else if let Some(code) = text.strip_prefix("ALARM:") {
-            StreamError::Alarm { line, code: number(code) }
-        } else {
-            StreamError::Garbled { line, text: text.to_string() }
-        };
-        self.brake(why, now_s)
-    }
-
-    fn answered(&mut self, now_s: f64) -> Vec<u8> {
-        self.idle_since_s = None;
-        let Some(k) = self.unanswered.pop_front() else {
-            return self.brake(StreamError::ExtraAnswer, now_s);
-        };
-        self.unanswered_bytes -= self.lines[k].bytes();
-        if self.lines[k].alone {
-            self.rest_until_s = now_s + EEPROM_REST_S;
-        }
-        if self.unanswered.is_empty() && self.next == self.lines.len() {
-            self.phase = Phase::Ending(0);
-        }
-        Vec::new()
-    }
-
-    fn banner(&mut self, now_s: f64) -> Vec<u8> {
-        match std::mem::replace(&mut self.phase, Phase::Sending) {
-            Phase::Resetting { why, .. } | Phase::Braking { why, .. } => {
-                self.phase = Phase::Over(Outcome::Stopped(why));
-                Vec::new()
-            }
-            Phase::Over(outcome) => {
-                self.phase = Phase::Over(outcome);
-                Vec::new()
-            }
-            Phase::Sending | Phase::Ending(_) => {
-                let line = self.about();
-                self.brake(StreamError::Restarted { line }, now_s)
-            }
-        }
-    }
-
-    /// A status report without its `<`.
-    fn status(&mut self, text: &str, now_s: f64) -> Vec<u8> {
-        let state = text.split(['|', '>']).next().unwrap_or_default();
-        let rests = matches!(state, "Idle" | "Hold:0" | "Door:0" | "Door:1" | "Alarm" | "Sleep");
-        match &mut self.phase {
-            Phase::Ending(times) => {
-                *times = if state == "Idle" { *times + 1 } else { 0 };
-                if *times >= 2 {
-                    self.phase = Phase::Over(Outcome::Done);
-                }
-            }
-            Phase::Sending if state == "Idle" && !self.unanswered.is_empty() => {
-                self.idle_since_s.get_or_insert(now_s);
-            }
-            Phase::Sending => self.idle_since_s = None,
-            Phase::Braking { why, .. } if rests => {
-                self.phase = Phase::Resetting { why: why.clone(), since_s: now_s };
-                return vec![0x18];
-            }
-            _ => {}
-        }
-        Vec::new()
-    }
-
-    /// What the time alone tells.
-    fn watch(&mut self, now_s: f64) -> Vec<u8> {
-        let line = self.about();
-        let dwells: f64 = self.unanswered.iter().map(|k| self.lines[*k].dwell_s).sum();
-        match &self.phase {
-            Phase::Sending | Phase::Ending(_)
-                if now_s - self.heard_s > SILENCE_S && !self.is_homing() =>
-            {
-                self.brake(StreamError::Silent { line, seconds: SILENCE_S as u32 }, now_s)
-            }
-            Phase::Sending if self.idle_since_s.is_some_and(|s| now_s - s > LOST_S + dwells) => {
-                self.brake(StreamError::LostAnswer { line }, now_s)
-            }
-            Phase::Braking { why, since_s }
-                if now_s - since_s > STOP_S || now_s - self.heard_s > SILENCE_S =>
-            {
-                self.phase = Phase::Resetting { why: why.clone(), since_s: now_s };
-                vec![0x18]
-            }
-            Phase::Resetting { why, since_s } if now_s - since_s > BANNER_S => {
-                self.phase = Phase::Over(Outcome::Stopped(why.clone()));
-                Vec::new()
-            }
-            _ => Vec::new(),
-        }
-    }
-
-    /// While homing the controller answers nothing, not even `?`.
-    fn is_homing(&self) -> bool {
-        self.unanswered.front().is_some_and(|k| self.lines[*k].text == "$H")
-    }
-
-    /// Begins to stop; nothing more of the program is sent.
-    fn brake(&mut self, why: StreamError, now_s: f64) -> Vec<u8> {
-        if !matches!(self.phase, Phase::Sending | Phase::Ending(_)) {
-            return Vec::new();
-        }
-        self.phase = Phase::Braking { why, since_s: now_s };
-        self.asked_s = now_s;
-        b"!?".to_vec()
-    }
-
-    fn send(&mut self, now_s: f64, say: &mut Vec<u8>) {
-        while let Some(line) = self.lines.get(self.next) {
-            let before_alone = self.unanswered.back().is_some_and(|k| self.lines[*k].alone);
-            let waits = (line.alone || before_alone) && !self.unanswered.is_empty();
-            let full = self.unanswered_bytes + line.bytes() > self.window;
-            if waits || full || now_s < self.rest_until_s {
-                return;
-            }
-            say.extend_from_slice(line.text.as_bytes());
-            say.push(b'\n');
-            self.unanswered_bytes += line.bytes();
-            self.unanswered.push_back(self.next);
-            self.next += 1;
-        }
+    fn works(&self) -> bool {
+        matches!(self.phase, Phase::Sending | Phase::Ending(_))
     }
 }
