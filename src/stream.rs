@@ -25,7 +25,7 @@ pub use link::{Dtr, Link, LinkError, Simulation, Tcp};
 pub use link::{PortInfo, Serial, ports};
 pub use meaning::{alarm as alarm_meaning, error as error_meaning};
 pub use prepare::{Line, Script, prepare};
-pub use rehearse::{Rehearsed, rehearse};
+pub use rehearse::{RehearseError, Rehearsed, rehearse};
 pub use sender::{Outcome, Purpose, RING_BYTES, Rest, Sender};
 pub use session::{
     Command, Event, Options, Progress, SessionError, Summary, Zero, probe, run as session,
