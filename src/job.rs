@@ -26,7 +26,7 @@ pub use library::{BUILT_IN_FILES, Library};
 pub use types::{
     ArtworkSpec, Background, Combine, CrestSpec, CutterShape, CutterSpec, Fit, Follow, Found,
     FoundLayer, Job, Join, KeepOut, LayerSpec, Machine, Milling, Operation, OperationKind, Origin,
-    Pattern, Place, Profile, Prune, ReliefSpec, Rgb, Selector, Significance, SkeletonSpec, Split,
-    Stepover, Stock, SurfaceSpec, Within, Wood,
+    Pattern, Place, Profile, Prune, ReliefSpec, Rgb, Scheme, Selector, Significance, SkeletonSpec,
+    Split, Stepover, Stock, SurfaceSpec, Within, Wood,
 };
 pub use write::{defaults_table, template};

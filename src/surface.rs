@@ -18,6 +18,7 @@ mod ratio;
 mod ridge;
 mod ruled;
 mod rungs;
+mod subdivide;
 mod weld;
 
 pub use crested::{Fineness, Skeleton, lower_walls, ridge_of};
@@ -31,6 +32,9 @@ pub use ratio::{field as ratio_field, field_finely as ratio_field_finely};
 pub use ridge::{Heights, Ridge};
 pub use ruled::{Density, RuledFault, check as check_ruled, mesh as ruled_mesh};
 pub use rungs::{Rungs, rungs};
+pub use subdivide::{
+    MOST_FACES, PolyMesh, SubdivideError, Topology, adaptive, limit, subdivide,
+};
 
 use crate::geom::{Bounds, Grid, Tolerance};
 use crate::job::{LayerSpec, SurfaceSpec};

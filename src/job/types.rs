@@ -358,6 +358,53 @@ impl Default for CrestSpec {
     }
 }
 
+/// A subdivision scheme.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Scheme {
+    /// Modified butterfly (Zorin, Schröder, Sweldens 1996): interpolating, smooth everywhere.
+    Butterfly,
+    /// Butterfly (Dyn, Levin, Gregory 1990): interpolating, not smooth where valences are 3 or above 7.
+    ButterflyOriginal,
+    /// Loop (1987): approximating.
+    Loop,
+    /// Kobbelt (2000): approximating, three times the triangles a step.
+    Sqrt3,
+    /// Catmull and Clark (1978): approximating, quadrilaterals.
+    CatmullClark,
+    /// Doo and Sabin (1978): approximating, dual; cuts the corners of the outline.
+    DooSabin,
+}
+
+impl Scheme {
+    /// All of them.
+    pub const ALL: [Self; 6] = [
+        Self::Butterfly,
+        Self::ButterflyOriginal,
+        Self::Loop,
+        Self::Sqrt3,
+        Self::CatmullClark,
+        Self::DooSabin,
+    ];
+
+    /// Its name in job files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Butterfly => "butterfly",
+            Self::ButterflyOriginal => "butterfly-original",
+            Self::Loop => "loop",
+            Self::Sqrt3 => "sqrt3",
+            Self::CatmullClark => "catmull-clark",
+            Self::DooSabin => "doo-sabin",
+        }
+    }
+
+    /// True when its surface goes through the vertices of the control mesh.
+    pub fn interpolates(self) -> bool {
+        matches!(self, Self::Butterfly | Self::ButterflyOriginal)
+    }
+}
+
 /// How the skeleton of an outline is found.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct SkeletonSpec {
