@@ -24,7 +24,7 @@ pub use draft::Draft;
 pub use error::{Fault, JobError};
 pub use library::{BUILT_IN_FILES, Library};
 pub use types::{
-    ArtworkSpec, Background, Combine, CrestSpec, CutterShape, CutterSpec, Fit, Follow, Found,
+    ArtworkSpec, Background, Combine, Control, CrestSpec, CutterShape, CutterSpec, Fit, Follow, Found,
     FoundLayer, Job, Join, KeepOut, LayerSpec, Machine, Milling, Operation, OperationKind, Origin,
     Pattern, Place, Profile, Prune, ReliefSpec, Rgb, Scheme, Selector, Significance, SkeletonSpec,
     Split, Stepover, Stock, SurfaceSpec, Within, Wood,

@@ -4,6 +4,7 @@
 //! are those above the layer's reference plane; what lies below, offsets and seams are the merge's work.
 //! Whatever cannot be raised as asked for is told in [`Raised::notes`], never dropped in silence.
 
+mod control;
 mod crest;
 mod crested;
 mod distance;
@@ -21,6 +22,7 @@ mod rungs;
 mod subdivide;
 mod weld;
 
+pub use control::{Rim, control};
 pub use crested::{Fineness, Skeleton, lower_walls, ridge_of};
 pub use distance::Segments;
 pub use inscribed::inscribed_radius;

@@ -405,6 +405,20 @@ impl Scheme {
     }
 }
 
+/// How the control mesh of a subdivision surface is made from the cells.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Control {
+    /// Runs rebuilt on symmetric rungs at even distances.
+    Even,
+    /// Each sleeve cut through the middles of its three sides.
+    Split,
+    /// Pairs of sleeves as quadrilaterals without a vertex between them, in four triangles.
+    Quad4,
+    /// The same in six triangles, with new vertices on the outline.
+    Quad6,
+}
+
 /// How the skeleton of an outline is found.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct SkeletonSpec {
