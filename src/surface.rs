@@ -8,6 +8,7 @@ mod control;
 mod crest;
 mod crested;
 mod distance;
+mod fields;
 mod harmonic;
 mod inscribed;
 mod inside;
@@ -24,21 +25,22 @@ mod subdivide;
 mod weld;
 
 pub use control::{Rim, control};
-pub use crested::{Fineness, Skeleton, lower_walls, ridge_of};
+pub use crested::{Fineness, Skeleton, Subdivided, lower_walls, ridge_of};
 pub use distance::Segments;
+pub use fields::{Rise, r_function, scan_lines};
 pub use inscribed::inscribed_radius;
 pub use inside::inside_spans;
 pub use literal::{Over, patches};
 pub use mesh::{Mesh, MeshError};
 pub use patch::{FINE, FINE_ROWS, Patch, Window, averaged, finer};
 pub use profile::{capped_height, outline_height, profile_at, smooth_cap};
-pub use ratio::{field as ratio_field, field_finely as ratio_field_finely};
+pub use ratio::{
+    Way, field as ratio_field, field_finely as ratio_field_finely, field_of as crest_field,
+};
 pub use ridge::{Heights, Ridge};
 pub use ruled::{Density, RuledFault, check as check_ruled, mesh as ruled_mesh};
 pub use rungs::{Rungs, rungs};
-pub use subdivide::{
-    MOST_FACES, PolyMesh, SubdivideError, Topology, adaptive, limit, subdivide,
-};
+pub use subdivide::{MOST_FACES, PolyMesh, SubdivideError, Topology, adaptive, limit, subdivide};
 
 use crate::geom::{Bounds, Grid, Tolerance};
 use crate::job::{LayerSpec, SurfaceSpec};
@@ -117,12 +119,27 @@ pub enum Remark {
         /// Why.
         why: SkeletonError,
     },
-    /// Its ruled mesh failed a check: it got the ratio field.
+    /// No middle of a scan line counts: it got the distance profile.
+    NoMiddle {
+        /// The middle of its bounding box, mm.
+        at: crate::geom::DVec2,
+    },
+    /// Its mesh failed a check: it got the ratio field.
     FellBack {
         /// The middle of its bounding box, mm.
         at: crate::geom::DVec2,
         /// Why.
         why: RuledFault,
+    },
+    /// An approximating scheme draws the outline in: this part of the figure is covered, the rest lies at the base.
+    DrawnIn {
+        /// Area of the surface over that of the figure.
+        covered: f64,
+    },
+    /// The subdivision surface folded over itself in places: these were smoothed.
+    Unfolded {
+        /// Part of its vertices that moved.
+        part: f64,
     },
     /// The ridge was asked to lie below the outline; it lies level with it.
     RidgeBelowBase,
@@ -172,17 +189,16 @@ pub fn raise(
     if over > grid.pitch_mm {
         remarks.push(Remark::OverTheEdge { by_mm: over });
     }
-    let mut raise_crest = |crest, ratio| {
-        let method = crested::Method { crest, ratio };
-        crested::raise(figure, layer, method, grid, tolerance, &mut remarks)
-    };
-    let surface = match &layer.surface {
-        SurfaceSpec::Ruled(crest) => raise_crest(crest, false),
-        SurfaceSpec::Ratio(crest) => raise_crest(crest, true),
-        SurfaceSpec::Profile { profile, radius_mm } => {
+    let surface = match (&layer.surface, layer.surface.crest()) {
+        (SurfaceSpec::Profile { profile, radius_mm }, _) => {
             let flank = profile::Flank::of(layer, *profile, *radius_mm);
             Surface::Field(profile::raise(figure, &flank, grid, &mut remarks))
         }
+        (SurfaceSpec::RFunction { .. } | SurfaceSpec::ScanLines { .. }, _) => {
+            Surface::Field(fields::raise(figure, layer, grid, tolerance, &mut remarks))
+        }
+        (_, Some(crest)) => crested::raise(figure, layer, crest, grid, tolerance, &mut remarks),
+        (_, None) => Surface::Parts(Vec::new()),
     };
     Ok(RaisedFigure { surface, remarks })
 }
@@ -231,7 +247,7 @@ fn check_numbers(figure: &Figure, layer: &LayerSpec) -> Result<(), SurfaceError>
     }
     let radius_mm = match layer.surface {
         SurfaceSpec::Profile { radius_mm, .. } => radius_mm,
-        SurfaceSpec::Ruled(_) | SurfaceSpec::Ratio(_) => None,
+        _ => None,
     };
     let right_angle = std::f64::consts::FRAC_PI_2;
     let checks = [
@@ -269,6 +285,9 @@ fn tell(layer: &LayerSpec, remarks: &[(&str, Remark)], pitch_mm: f64, notes: &mu
     let mut over: Option<(usize, f64, &str)> = None;
     let mut lost: Option<(usize, &str, crate::geom::DVec2, SkeletonError)> = None;
     let mut fell_back: Option<(usize, &str, crate::geom::DVec2, RuledFault)> = None;
+    let mut no_middle: Option<(usize, &str, crate::geom::DVec2)> = None;
+    let mut drawn_in: Option<(usize, f64, &str)> = None;
+    let mut unfolded: Option<(usize, f64, &str)> = None;
     let mut below_base = false;
     for &(source, remark) in remarks {
         match remark {
@@ -302,9 +321,24 @@ fn tell(layer: &LayerSpec, remarks: &[(&str, Remark)], pitch_mm: f64, notes: &mu
                 let seen = lost.get_or_insert((0, source, at, why));
                 seen.0 += 1;
             }
+            Remark::NoMiddle { at } => no_middle.get_or_insert((0, source, at)).0 += 1,
             Remark::FellBack { at, why } => {
                 let seen = fell_back.get_or_insert((0, source, at, why));
                 seen.0 += 1;
+            }
+            Remark::DrawnIn { covered } => {
+                let seen = drawn_in.get_or_insert((0, f64::INFINITY, source));
+                seen.0 += 1;
+                if covered < seen.1 {
+                    (seen.1, seen.2) = (covered, source);
+                }
+            }
+            Remark::Unfolded { part } => {
+                let seen = unfolded.get_or_insert((0, 0.0, source));
+                seen.0 += 1;
+                if part > seen.1 {
+                    (seen.1, seen.2) = (part, source);
+                }
             }
             Remark::RidgeBelowBase => below_base = true,
         }
@@ -351,9 +385,34 @@ fn tell(layer: &LayerSpec, remarks: &[(&str, Remark)], pitch_mm: f64, notes: &mu
     }
     if let Some((n, source, at, why)) = fell_back {
         notes.push(format!(
-            "layer '{name}': {n} part(s) got the ratio field because their ruled surface failed a check; the \
+            "layer '{name}': {n} part(s) got the ratio field because their {} surface failed a check; the \
              first: {source}, at {:.1}, {:.1}: {why}",
+            layer.surface.method(),
+            at.x,
+            at.y
+        ));
+    }
+    if let Some((n, source, at)) = no_middle {
+        notes.push(format!(
+            "layer '{name}': {n} part(s) got the distance profile because no scan line runs right across them; the \
+             first: {source}, at {:.1}, {:.1}",
             at.x, at.y
+        ));
+    }
+    if let Some((n, covered, source)) = drawn_in {
+        notes.push(format!(
+            "layer '{name}': the {} surface draws the outlines of {n} part(s) in; the smallest covers {:.1} % of its \
+             figure ({source}), the rest lies at base_mm; a smaller surface.edge_mm follows the outline more closely",
+            layer.surface.method(),
+            100.0 * covered
+        ));
+    }
+    if let Some((n, part, source)) = unfolded {
+        notes.push(format!(
+            "layer '{name}': the {} surface folded over itself in {n} part(s) and was smoothed there; at most {:.2} % of \
+             the points of one moved ({source})",
+            layer.surface.method(),
+            100.0 * part
         ));
     }
     if below_base {
@@ -366,3 +425,6 @@ fn tell(layer: &LayerSpec, remarks: &[(&str, Remark)], pitch_mm: f64, notes: &mu
 
 #[cfg(test)]
 mod figures_tests;
+
+#[cfg(test)]
+mod methods_tests;

@@ -60,14 +60,15 @@ fn surfaces_are_as_true_and_as_smooth_as_tabled() {
 #[test]
 fn patches_meet_as_smoothly_as_tabled() {
     let all = shapes(FINE);
-    for (seam, name, tabled) in CREASES {
+    for (method, seam, name, tabled) in CREASES {
         let shape: &Shape = all.iter().find(|s| s.name == name).unwrap();
-        let got = crease(shape, seam).unwrap();
+        let got = crease(shape, method, seam).unwrap();
         for (got, tabled) in got.into_iter().zip(tabled) {
             // What is left of the facets' own bends is below half a degree.
             assert!(
                 got <= tabled * (1.0 + WITHIN) + 0.5,
-                "{} {name}: {got} / {tabled}",
+                "{} {} {name}: {got} / {tabled}",
+                method.name(),
                 seam.name()
             );
         }
