@@ -15,10 +15,12 @@ mod inside;
 mod kite;
 mod literal;
 mod mesh;
+mod notes;
 mod patch;
 mod profile;
 mod ratio;
 mod ridge;
+mod rim;
 mod ruled;
 mod rungs;
 mod subdivide;
@@ -231,7 +233,7 @@ pub fn raise_all(
     }
     let mut notes = Vec::new();
     for (layer, remarks) in layers.iter().zip(&remarks) {
-        tell(layer, remarks, grid.pitch_mm, &mut notes);
+        notes::tell(layer, remarks, grid.pitch_mm, &mut notes);
     }
     Ok(Raised { surfaces, notes })
 }
@@ -272,154 +274,6 @@ fn check_numbers(figure: &Figure, layer: &LayerSpec) -> Result<(), SurfaceError>
         Some((key, value, _, cure)) => {
             Err(SurfaceError::BadSetting { layer: layer.name.clone(), key, value, cure })
         }
-    }
-}
-
-/// Counts the remarks on one layer up into notes: one for each kind, with the worst case named.
-fn tell(layer: &LayerSpec, remarks: &[(&str, Remark)], pitch_mm: f64, notes: &mut Vec<String>) {
-    let name = &layer.name;
-    // (how many, worst value, which figure, where)
-    let mut too_narrow: Option<(usize, f64, &str, crate::geom::DVec2)> = None;
-    let mut narrow = too_narrow;
-    let mut capped: Option<(usize, f64, &str)> = None;
-    let mut over: Option<(usize, f64, &str)> = None;
-    let mut lost: Option<(usize, &str, crate::geom::DVec2, SkeletonError)> = None;
-    let mut fell_back: Option<(usize, &str, crate::geom::DVec2, RuledFault)> = None;
-    let mut no_middle: Option<(usize, &str, crate::geom::DVec2)> = None;
-    let mut drawn_in: Option<(usize, f64, &str)> = None;
-    let mut unfolded: Option<(usize, f64, &str)> = None;
-    let mut below_base = false;
-    for &(source, remark) in remarks {
-        match remark {
-            Remark::Narrow { width_mm, at } | Remark::TooNarrow { width_mm, at } => {
-                let slot = if matches!(remark, Remark::Narrow { .. }) {
-                    &mut narrow
-                } else {
-                    &mut too_narrow
-                };
-                let seen = slot.get_or_insert((0, f64::INFINITY, source, at));
-                seen.0 += 1;
-                if width_mm < seen.1 {
-                    (seen.1, seen.2, seen.3) = (width_mm, source, at);
-                }
-            }
-            Remark::Capped { height_mm } => {
-                let seen = capped.get_or_insert((0, f64::INFINITY, source));
-                seen.0 += 1;
-                if height_mm < seen.1 {
-                    (seen.1, seen.2) = (height_mm, source);
-                }
-            }
-            Remark::OverTheEdge { by_mm } => {
-                let seen = over.get_or_insert((0, 0.0, source));
-                seen.0 += 1;
-                if by_mm > seen.1 {
-                    (seen.1, seen.2) = (by_mm, source);
-                }
-            }
-            Remark::NoSkeleton { at, why } => {
-                let seen = lost.get_or_insert((0, source, at, why));
-                seen.0 += 1;
-            }
-            Remark::NoMiddle { at } => no_middle.get_or_insert((0, source, at)).0 += 1,
-            Remark::FellBack { at, why } => {
-                let seen = fell_back.get_or_insert((0, source, at, why));
-                seen.0 += 1;
-            }
-            Remark::DrawnIn { covered } => {
-                let seen = drawn_in.get_or_insert((0, f64::INFINITY, source));
-                seen.0 += 1;
-                if covered < seen.1 {
-                    (seen.1, seen.2) = (covered, source);
-                }
-            }
-            Remark::Unfolded { part } => {
-                let seen = unfolded.get_or_insert((0, 0.0, source));
-                seen.0 += 1;
-                if part > seen.1 {
-                    (seen.1, seen.2) = (part, source);
-                }
-            }
-            Remark::RidgeBelowBase => below_base = true,
-        }
-    }
-    if let Some((n, width, source, at)) = too_narrow {
-        notes.push(format!(
-            "layer '{name}': {n} part(s) are narrower than one cell of the grid and cannot be carved true to \
-             shape; the thinnest is {width:.3} mm wide ({source}, at {:.1}, {:.1}); set relief.pitch_mm below \
-             {:.3} (now {pitch_mm}) or widen the artwork",
-            at.x,
-            at.y,
-            width / 3.0
-        ));
-    }
-    if let Some((n, width, source, at)) = narrow {
-        notes.push(format!(
-            "layer '{name}': {n} part(s) are narrower than three cells of the grid; their heights are averages; \
-             the thinnest is {width:.3} mm wide ({source}, at {:.1}, {:.1}); a relief.pitch_mm below {:.3} (now \
-             {pitch_mm}) shows them in full",
-            at.x,
-            at.y,
-            width / 3.0
-        ));
-    }
-    if let Some((n, height, source)) = capped {
-        notes.push(format!(
-            "layer '{name}': slope_cap = {} keeps the ridge of {n} narrow part(s) below height_mm = {}; the \
-             lowest rises to {height:.2} mm ({source})",
-            layer.slope_cap, layer.height_mm
-        ));
-    }
-    if let Some((n, by, source)) = over {
-        notes.push(format!(
-            "layer '{name}': {n} figure(s) reach past the edge of the stock, by up to {by:.2} mm ({source}); \
-             they are cut off there"
-        ));
-    }
-    if let Some((n, source, at, why)) = lost {
-        notes.push(format!(
-            "layer '{name}': {n} part(s) have no skeleton and got the distance profile instead of a crest; the \
-             first: {source}, at {:.1}, {:.1}: {why}",
-            at.x, at.y
-        ));
-    }
-    if let Some((n, source, at, why)) = fell_back {
-        notes.push(format!(
-            "layer '{name}': {n} part(s) got the ratio field because their {} surface failed a check; the \
-             first: {source}, at {:.1}, {:.1}: {why}",
-            layer.surface.method(),
-            at.x,
-            at.y
-        ));
-    }
-    if let Some((n, source, at)) = no_middle {
-        notes.push(format!(
-            "layer '{name}': {n} part(s) got the distance profile because no scan line runs right across them; the \
-             first: {source}, at {:.1}, {:.1}",
-            at.x, at.y
-        ));
-    }
-    if let Some((n, covered, source)) = drawn_in {
-        notes.push(format!(
-            "layer '{name}': the {} surface draws the outlines of {n} part(s) in; the smallest covers {:.1} % of its \
-             figure ({source}), the rest lies at base_mm; a smaller surface.edge_mm follows the outline more closely",
-            layer.surface.method(),
-            100.0 * covered
-        ));
-    }
-    if let Some((n, part, source)) = unfolded {
-        notes.push(format!(
-            "layer '{name}': the {} surface folded over itself in {n} part(s) and was smoothed there; at most {:.2} % of \
-             the points of one moved ({source})",
-            layer.surface.method(),
-            100.0 * part
-        ));
-    }
-    if below_base {
-        notes.push(format!(
-            "layer '{name}': height_mm = {} lies below base_mm = {}; the layer is flat at base_mm",
-            layer.height_mm, layer.base_mm
-        ));
     }
 }
 

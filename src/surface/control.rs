@@ -225,7 +225,9 @@ impl<'a> Build<'a> {
         } else {
             vec![[a, b, e], [b, f, e], [c, d, f], [d, e, f]]
         };
-        faces.iter().for_each(|face| self.mesh.add_face(face));
+        for face in &faces {
+            self.mesh.add_face(face);
+        }
     }
 
     /// A run rebuilt on rungs; `line` holds the heights of their middles.

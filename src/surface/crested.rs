@@ -11,7 +11,7 @@ use super::rungs::{Rungs, rungs};
 use super::subdivide::{PolyMesh, adaptive, limit, subdivide};
 use super::{
     FINE, Mesh, Over, Patch, Remark, Rim, RuledFault, Segments, Surface, Way, Window, control,
-    inscribed_radius, literal, ratio, ruled,
+    inscribed_radius, literal, ratio, rim, ruled,
 };
 use crate::geom::{Grid, Tolerance};
 use crate::job::{CrestSpec, LayerSpec, Scheme, SkeletonSpec, SubdivisionSpec, SurfaceSpec};
@@ -292,6 +292,9 @@ impl Skeleton {
         };
         let settled = fine.and_then(|fine| limit(&fine, spec.scheme));
         let mut mesh = settled.map_err(RuledFault::Subdivision)?.to_triangles();
+        if spec.scheme.interpolates() {
+            rim::follow(&mut mesh, &control, &self.sampled);
+        }
         // Folds that are left are found by the check.
         let smoothed = mesh.unfold().unwrap_or(0);
         let covered = ruled::check_but_area(&mesh, &self.sampled, ridge)?;

@@ -23,8 +23,7 @@ fn patches_of(ridge_true: bool) -> SurfaceSpec {
     SurfaceSpec::Patches { ridge_true, crest: CrestSpec { skeleton, ..CrestSpec::default() } }
 }
 
-/// Of 40 random figures, every third with a hole, so many at most fall back on the ratio field. (These figures are
-/// nastier than artwork: where the feet of rungs bunch at a hollow, the four-point curve of the rim may loop.)
+/// Of 40 random figures, every third with a hole, so many at most fall back on the ratio field.
 fn raised_with_fallbacks(surface: &SurfaceSpec, most: usize) {
     let mut noise = Noise(4711);
     let mut fell_back = Vec::new();
@@ -52,27 +51,28 @@ fn raised_with_fallbacks(surface: &SurfaceSpec, most: usize) {
             other => panic!("{other:?}"),
         }
     }
-    println!("{surface:?}: {} fell back", fell_back.len());
+    println!("{}: {} fell back", surface.method(), fell_back.len());
     assert!(fell_back.len() <= most, "{}: {fell_back:?}", surface.method());
 }
 
 #[test]
 fn patches_are_raised() {
-    raised_with_fallbacks(&patches_of(false), 4);
-    raised_with_fallbacks(&patches_of(true), 20);
+    raised_with_fallbacks(&patches_of(false), 2);
+    // Where the ridge is on the spine, rows may cross on the inside of bends.
+    raised_with_fallbacks(&patches_of(true), 8);
 }
 
 #[test]
 fn subdivision_surfaces_are_raised() {
     for scheme in Scheme::ALL {
-        raised_with_fallbacks(&subdivision(scheme, Control::Even), 12);
+        raised_with_fallbacks(&subdivision(scheme, Control::Even), 2);
     }
 }
 
 #[test]
 fn other_control_meshes_are_raised() {
     for control in [Control::Split, Control::Quad4, Control::Quad6] {
-        raised_with_fallbacks(&subdivision(Scheme::Butterfly, control), 20);
+        raised_with_fallbacks(&subdivision(Scheme::Butterfly, control), 2);
     }
 }
 

@@ -23,6 +23,8 @@ use rayon::prelude::*;
 
 /// Nodes this near to the spine have its height, in cells: a line passes one at least as near.
 const ON_SPINE_CELLS: f64 = 0.71;
+/// Nodes this near to outline or spine are held, in cells: a little more than one, for those exactly as far.
+const HELD_CELLS: f32 = 1.01;
 /// How often the nodes beside outline and spine are set anew by those that they hold.
 const HOLDING_ROUNDS: usize = 2;
 /// Rows that a band of fine samples sees beyond its edges: 4 cells, more than a narrow region is wide.
@@ -33,8 +35,7 @@ const HALO: usize = 16;
 pub enum Way {
     /// By the distances to both.
     Distances,
-    /// By the Laplace equation, 0 on the outline and 1 on the spine: the smoothest. Nodes less than a cell from either
-    /// have what the distances say.
+    /// By the Laplace equation, 0 on the outline and 1 on the spine: the smoothest.
     Laplace,
 }
 
@@ -160,12 +161,12 @@ impl<'a> Ratio<'a> {
 /// The part of the way from the outline to the spine that solves the Laplace equation, by the distances to both (NaN
 /// outside), row-major.
 ///
-/// Nodes less than a cell from either are held: at first where the distances put them, then twice on the straight line
+/// Nodes up to a cell from either are held (so that every node with a neighbour outside is): at first where the distances put them, then twice on the straight line
 /// between the outline (or spine) and the neighbour farthest from it, so that they bend as little as what they hold.
 fn laplace(distances: [&[f32]; 2], nx: usize, cell: f32) -> Vec<f32> {
     let [d_b, d_s] = distances;
     let n = d_b.len();
-    let held = |k: usize| d_b[k].min(d_s[k]) < cell;
+    let held = |k: usize| d_b[k].min(d_s[k]) <= HELD_CELLS * cell;
     let mut part: Vec<f32> =
         (0..n).map(|k| if d_b[k] > 0.0 { d_b[k] / (d_b[k] + d_s[k]) } else { 0.0 }).collect();
     for round in 0..=HOLDING_ROUNDS {

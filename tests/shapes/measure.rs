@@ -3,6 +3,7 @@
 use super::Shape;
 use relievo::geom::{DVec2, DVec3, Grid, distance_to_segment};
 use relievo::job::{Control, Join, Profile, ScanShape, Scheme, SkeletonSpec};
+use relievo::outline::Region;
 use relievo::relief::rasterise;
 use relievo::skeleton::{Class, Sampled, cells, spine, triangulate};
 use relievo::surface::{
@@ -143,7 +144,11 @@ impl Raised {
                     .expect("lines run across every shape")
             }
             Method::RFunction => {
-                r_function(&shape.region, 2, CELL, Profile::Parabola, rise, &grid, &window)
+                // It depends on the edges: those of the tabled figures.
+                let mut rings = self.skeleton.sampled.rings().map(<[DVec2]>::to_vec);
+                let outer = rings.next().expect("a shape has an outline");
+                let region = Region { outer, holes: rings.collect() };
+                r_function(&region, 2, 1e-9, Profile::Parabola, rise, &grid, &window)
             }
             _ => crest(Way::Distances, &self.ridge),
         }

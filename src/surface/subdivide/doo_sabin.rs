@@ -30,13 +30,12 @@ pub(super) fn step(mesh: &PolyMesh, topology: &Topology) -> PolyMesh {
     let mut quarters = vec![[0; 2]; topology.sides()];
     for &h in topology.halves() {
         let (after, u, v) = (topology.next(h), topology.from(h), topology.to(h));
-        let [near_u, near_v] = match topology.twin(h) {
-            Some(t) => [topology.next(t), t],
-            None => {
-                let points = [0.75 * at(u) + 0.25 * at(v), 0.25 * at(u) + 0.75 * at(v)];
-                quarters[h as usize] = points.map(|p| out.add_vertex(p, false));
-                quarters[h as usize]
-            }
+        let [near_u, near_v] = if let Some(t) = topology.twin(h) {
+            [topology.next(t), t]
+        } else {
+            let points = [0.75 * at(u) + 0.25 * at(v), 0.25 * at(u) + 0.75 * at(v)];
+            quarters[h as usize] = points.map(|p| out.add_vertex(p, false));
+            quarters[h as usize]
         };
         out.add_face(&[near_u, near_v, after, h]);
     }

@@ -14,7 +14,9 @@ const SCHEMES: [Scheme; 6] = [
 
 fn mesh(vertices: &[[f64; 3]], faces: &[&[u32]]) -> PolyMesh {
     let mut mesh = PolyMesh::with_vertices(vertices.iter().map(|&v| DVec3::from(v)).collect());
-    faces.iter().for_each(|f| mesh.add_face(f));
+    for face in faces {
+        mesh.add_face(face);
+    }
     mesh
 }
 
@@ -323,16 +325,16 @@ proptest! {
     }
 }
 
-/// A straight band of three rows with heights 0, 1, 0, of quadrilaterals or of regular triangles.
+/// A straight band of five rows with heights 0, 0, 1, 0, 0, of quadrilaterals or of regular triangles.
 fn band(triangles: bool) -> PolyMesh {
     let (n, height) = (16_u32, if triangles { 0.75_f64.sqrt() } else { 1.0 });
     let mut band = PolyMesh::new();
-    for k in 0..3 * (n + 1) {
+    for k in 0..5 * (n + 1) {
         let (i, j) = (f64::from(k % (n + 1)), f64::from(k / (n + 1)));
         let x = if triangles { i + 0.5 * j } else { i };
-        band.add_vertex(DVec3::new(x, height * j, f64::from(u8::from(j == 1.0))), false);
+        band.add_vertex(DVec3::new(x, height * j, f64::from(u8::from(j == 2.0))), false);
     }
-    for k in (0..2 * (n + 1)).filter(|k| k % (n + 1) < n) {
+    for k in (0..4 * (n + 1)).filter(|k| k % (n + 1) < n) {
         let (a, b, c, d) = (k, k + 1, k + n + 2, k + n + 1);
         if triangles {
             band.add_face(&[a, b, d]);
