@@ -69,7 +69,7 @@ pub fn control(
         match form {
             Control::Even => build.even(run, rungs, line),
             Control::Split | Control::Quad4 | Control::Quad6 => {
-                build.sleeves(cells, run, line, form)
+                build.sleeves(cells, run, line, form);
             }
         }
     }

@@ -316,7 +316,7 @@ proptest! {
             }
             let faces = match scheme {
                 Scheme::Butterfly | Scheme::ButterflyOriginal | Scheme::Loop => rim.len() << (2 * levels),
-                Scheme::CatmullClark => 3 * rim.len() << (2 * (levels - 1)),
+                Scheme::CatmullClark => (3 * rim.len()) << (2 * (levels - 1)),
                 Scheme::Sqrt3 if levels == 2 => 9 * rim.len(),
                 Scheme::Sqrt3 | Scheme::DooSabin => fine.len(),
             };
