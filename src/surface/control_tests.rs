@@ -1,11 +1,11 @@
 //! The tables of sections 4.3 and 5.7 of the specification of the surfaces, and laws of control meshes.
 
-use super::super::{Mesh, Topology, adaptive, subdivide};
 use super::*;
 use crate::geom::{DVec3, Ring, orient, signed_area};
 use crate::job::{Profile, Prune, Scheme, SkeletonSpec};
 use crate::skeleton::fixture::{bar, hexring2, plus2, sampled, y2};
 use crate::skeleton::{cells, triangulate};
+use crate::surface::{Mesh, Topology, adaptive, subdivide};
 use proptest::prelude::*;
 
 fn ridge(rings: usize) -> Ridge {

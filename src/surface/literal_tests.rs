@@ -1,11 +1,11 @@
 //! The values of section 6.4 of the specification of the surfaces.
 
-use super::super::ruled;
 use super::*;
 use crate::geom::{Ring, orient};
 use crate::job::{Join, Profile, Prune, SkeletonSpec};
 use crate::skeleton::fixture::{bar, hexring2, plus2, sampled, y2};
 use crate::skeleton::{cells, triangulate};
+use crate::surface::ruled;
 
 fn v(x: f64, y: f64, z: f64) -> DVec3 {
     DVec3::new(x, y, z)

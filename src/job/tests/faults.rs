@@ -135,10 +135,10 @@ fn unknown_names_name_the_nearest() {
         &["rule", "there is: ruled, ratio, profile"],
     );
     refused(
-        &layer("surface = { method = \"butterfly\", levels = 4 }"),
+        &layer("surface = { method = \"butterflies\", levels = 4 }"),
         kind,
         (5, 22),
-        &["butterfly"],
+        &["butterflies", "butterfly, butterfly-original"],
     );
     refused(&layer("combine = \"maximum\""), kind, (5, 11), &["did you mean \"max\"?"]);
     let select = |text: &str| with(&format!("[[layer]]\nselect = \"{text}\"\n"));

@@ -359,8 +359,13 @@ fn ridges_sink_as_tabled() {
         (Scheme::ButterflyOriginal, true, 1.0),
     ] {
         let fine = limit(&subdivide(&band(triangles), scheme, 4).unwrap(), scheme).unwrap();
-        let middle = fine.vertices.iter().filter(|v| (6.0..11.0).contains(&v.x));
-        let top = middle.map(|v| v.z).fold(0.0, f64::max);
+        // Between its vertices the ridge of Kobbelt's surface is not level: it goes by the old one in the middle.
+        let top = if scheme == Scheme::DooSabin {
+            let middle = fine.vertices.iter().filter(|v| (6.0..11.0).contains(&v.x));
+            middle.map(|v| v.z).fold(0.0, f64::max)
+        } else {
+            fine.vertices[2 * 17 + 8].z
+        };
         // Doo and Sabin's vertices are no limit points: a quadratic B-spline's control points lie 1/8 of a second
         // difference off, which a step divides by four.
         let slack = if scheme == Scheme::DooSabin { 0.01 } else { 1e-9 };
