@@ -58,11 +58,15 @@ fn main() {
         let Ladder { count, steps: [least, most], imbalance } = Ladder::of(shape);
         println!("| {} | {count} | {least:.4} | {most:.4} | {imbalance:.4} |", shape.name);
     }
-    println!("\n| seam | shape | median, degrees | 95 % |");
-    println!("|---|---|---|---|");
-    for (seam, name, [median, most]) in CREASES {
+    println!("\n| method | seam | shape | median, degrees | 95 % |");
+    println!("|---|---|---|---|---|");
+    for (method, seam, name, [median, most]) in CREASES {
         let shape = all.iter().find(|s| s.name == name).expect("a known shape");
-        let [a, b] = crease(shape, seam).expect("the shape has such a seam");
-        println!("| {} | {name} | {a:.2} / {median} | {b:.2} / {most} |", seam.name());
+        let [a, b] = crease(shape, method, seam).expect("the shape has such a seam");
+        println!(
+            "| {} | {} | {name} | {a:.2} / {median} | {b:.2} / {most} |",
+            method.name(),
+            seam.name()
+        );
     }
 }

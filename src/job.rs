@@ -4,6 +4,7 @@
 //! what hangs on it (size, stock, layers) and gives the final [`Job`]. Nothing here touches the disk.
 
 mod types;
+mod surface;
 mod keys;
 mod error;
 mod colors;
@@ -23,10 +24,14 @@ pub use colors::swatch_name;
 pub use draft::Draft;
 pub use error::{Fault, JobError};
 pub use library::{BUILT_IN_FILES, Library};
+pub use surface::{
+    Control, CrestSpec, Join, Profile, Prune, ScanShape, Scheme, Significance, SkeletonSpec, Split,
+    SubdivisionSpec, SurfaceSpec,
+};
 pub use types::{
-    ArtworkSpec, Backdrop, Background, Combine, Connectivity, CrestSpec, CutterShape, CutterSpec,
-    Fit, Follow, Found, FoundLayer, Job, Join, KeepOut, LayerSpec, Machine, Milling, Operation,
-    OperationKind, Origin, Pattern, Place, Profile, Prune, ReliefSpec, Rgb, Selector, Significance,
-    SkeletonSpec, Split, Stepover, Stock, SurfaceSpec, TraceMethod, TraceSpec, Within, Wood,
+    ArtworkSpec, Backdrop, Background, Combine, Connectivity, CutterShape, CutterSpec, Fit, Follow,
+    Found, FoundLayer, Job, KeepOut, LayerSpec, Machine, Milling, Operation, OperationKind, Origin,
+    Pattern, Place, ReliefSpec, Rgb, Selector, Stepover, Stock, TraceMethod, TraceSpec, Within,
+    Wood,
 };
 pub use write::{defaults_table, template};

@@ -4,33 +4,45 @@
 //! are those above the layer's reference plane; what lies below, offsets and seams are the merge's work.
 //! Whatever cannot be raised as asked for is told in [`Raised::notes`], never dropped in silence.
 
+mod control;
 mod crest;
 mod crested;
 mod distance;
+mod fields;
 mod harmonic;
 mod inscribed;
 mod inside;
 mod kite;
+mod literal;
 mod mesh;
+mod notes;
 mod patch;
 mod profile;
 mod ratio;
 mod ridge;
+mod rim;
 mod ruled;
 mod rungs;
+mod subdivide;
 mod weld;
 
-pub use crested::{Fineness, Skeleton, lower_walls, ridge_of};
+pub use control::{Rim, control};
+pub use crested::{Fineness, Skeleton, Subdivided, lower_walls, ridge_of};
 pub use distance::Segments;
+pub use fields::{Rise, r_function, scan_lines};
 pub use inscribed::inscribed_radius;
 pub use inside::inside_spans;
+pub use literal::{Over, patches};
 pub use mesh::{Mesh, MeshError};
 pub use patch::{FINE, FINE_ROWS, Patch, Window, averaged, finer};
 pub use profile::{capped_height, outline_height, profile_at, smooth_cap};
-pub use ratio::{field as ratio_field, field_finely as ratio_field_finely};
+pub use ratio::{
+    Way, field as ratio_field, field_finely as ratio_field_finely, field_of as crest_field,
+};
 pub use ridge::{Heights, Ridge};
 pub use ruled::{Density, RuledFault, check as check_ruled, mesh as ruled_mesh};
 pub use rungs::{Rungs, rungs};
+pub use subdivide::{MOST_FACES, PolyMesh, SubdivideError, Topology, adaptive, limit, subdivide};
 
 use crate::geom::{Bounds, Grid, Tolerance};
 use crate::job::{LayerSpec, SurfaceSpec};
@@ -109,7 +121,12 @@ pub enum Remark {
         /// Why.
         why: SkeletonError,
     },
-    /// Its ruled mesh failed a check: it got the ratio field.
+    /// No middle of a scan line counts: it got the distance profile.
+    NoMiddle {
+        /// The middle of its bounding box, mm.
+        at: crate::geom::DVec2,
+    },
+    /// Its mesh failed a check: it got the ratio field.
     FellBack {
         /// The middle of its bounding box, mm.
         at: crate::geom::DVec2,
@@ -124,6 +141,16 @@ pub enum Remark {
         length_mm: f64,
         /// The middle of its bounding box, mm.
         at: crate::geom::DVec2,
+    },
+    /// An approximating scheme draws the outline in: this part of the figure is covered, the rest lies at the base.
+    DrawnIn {
+        /// Area of the surface over that of the figure.
+        covered: f64,
+    },
+    /// The subdivision surface folded over itself in places: these were smoothed.
+    Unfolded {
+        /// Part of its vertices that moved.
+        part: f64,
     },
     /// The ridge was asked to lie below the outline; it lies level with it.
     RidgeBelowBase,
@@ -173,17 +200,16 @@ pub fn raise(
     if over > grid.pitch_mm {
         remarks.push(Remark::OverTheEdge { by_mm: over });
     }
-    let mut raise_crest = |crest, ratio| {
-        let method = crested::Method { crest, ratio };
-        crested::raise(figure, layer, method, grid, tolerance, &mut remarks)
-    };
-    let surface = match &layer.surface {
-        SurfaceSpec::Ruled(crest) => raise_crest(crest, false),
-        SurfaceSpec::Ratio(crest) => raise_crest(crest, true),
-        SurfaceSpec::Profile { profile, radius_mm } => {
+    let surface = match (&layer.surface, layer.surface.crest()) {
+        (SurfaceSpec::Profile { profile, radius_mm }, _) => {
             let flank = profile::Flank::of(layer, *profile, *radius_mm);
             Surface::Field(profile::raise(figure, &flank, grid, &mut remarks))
         }
+        (SurfaceSpec::RFunction { .. } | SurfaceSpec::ScanLines { .. }, _) => {
+            Surface::Field(fields::raise(figure, layer, grid, tolerance, &mut remarks))
+        }
+        (_, Some(crest)) => crested::raise(figure, layer, crest, grid, tolerance, &mut remarks),
+        (_, None) => Surface::Parts(Vec::new()),
     };
     Ok(RaisedFigure { surface, remarks })
 }
@@ -216,8 +242,7 @@ pub fn raise_all(
     }
     let mut notes = Vec::new();
     for (layer, remarks) in layers.iter().zip(&remarks) {
-        tell(layer, remarks, grid.pitch_mm, &mut notes);
-        notes.extend(tell_rough(&layer.name, remarks));
+        notes::tell(layer, remarks, grid.pitch_mm, &mut notes);
     }
     Ok(Raised { surfaces, notes })
 }
@@ -233,7 +258,7 @@ fn check_numbers(figure: &Figure, layer: &LayerSpec) -> Result<(), SurfaceError>
     }
     let radius_mm = match layer.surface {
         SurfaceSpec::Profile { radius_mm, .. } => radius_mm,
-        SurfaceSpec::Ruled(_) | SurfaceSpec::Ratio(_) => None,
+        _ => None,
     };
     let right_angle = std::f64::consts::FRAC_PI_2;
     let checks = [
@@ -261,128 +286,8 @@ fn check_numbers(figure: &Figure, layer: &LayerSpec) -> Result<(), SurfaceError>
     }
 }
 
-/// Counts the remarks on one layer up into notes: one for each kind, with the worst case named.
-fn tell(layer: &LayerSpec, remarks: &[(&str, Remark)], pitch_mm: f64, notes: &mut Vec<String>) {
-    let name = &layer.name;
-    // (how many, worst value, which figure, where)
-    let mut too_narrow: Option<(usize, f64, &str, crate::geom::DVec2)> = None;
-    let mut narrow = too_narrow;
-    let mut capped: Option<(usize, f64, &str)> = None;
-    let mut over: Option<(usize, f64, &str)> = None;
-    let mut lost: Option<(usize, &str, crate::geom::DVec2, SkeletonError)> = None;
-    let mut fell_back: Option<(usize, &str, crate::geom::DVec2, RuledFault)> = None;
-    for &(source, remark) in remarks {
-        match remark {
-            Remark::Narrow { width_mm, at } | Remark::TooNarrow { width_mm, at } => {
-                let slot = if matches!(remark, Remark::Narrow { .. }) {
-                    &mut narrow
-                } else {
-                    &mut too_narrow
-                };
-                let seen = slot.get_or_insert((0, f64::INFINITY, source, at));
-                seen.0 += 1;
-                if width_mm < seen.1 {
-                    (seen.1, seen.2, seen.3) = (width_mm, source, at);
-                }
-            }
-            Remark::Capped { height_mm } => {
-                let seen = capped.get_or_insert((0, f64::INFINITY, source));
-                seen.0 += 1;
-                if height_mm < seen.1 {
-                    (seen.1, seen.2) = (height_mm, source);
-                }
-            }
-            Remark::OverTheEdge { by_mm } => {
-                let seen = over.get_or_insert((0, 0.0, source));
-                seen.0 += 1;
-                if by_mm > seen.1 {
-                    (seen.1, seen.2) = (by_mm, source);
-                }
-            }
-            Remark::NoSkeleton { at, why } => {
-                let seen = lost.get_or_insert((0, source, at, why));
-                seen.0 += 1;
-            }
-            Remark::FellBack { at, why } => {
-                let seen = fell_back.get_or_insert((0, source, at, why));
-                seen.0 += 1;
-            }
-            Remark::Rough { .. } | Remark::RidgeBelowBase => {}
-        }
-    }
-    if let Some((n, width, source, at)) = too_narrow {
-        notes.push(format!(
-            "layer '{name}': {n} part(s) are narrower than one cell of the grid and cannot be carved true to \
-             shape; the thinnest is {width:.3} mm wide ({source}, at {:.1}, {:.1}); set relief.pitch_mm below \
-             {:.3} (now {pitch_mm}) or widen the artwork",
-            at.x,
-            at.y,
-            width / 3.0
-        ));
-    }
-    if let Some((n, width, source, at)) = narrow {
-        notes.push(format!(
-            "layer '{name}': {n} part(s) are narrower than three cells of the grid; their heights are averages; \
-             the thinnest is {width:.3} mm wide ({source}, at {:.1}, {:.1}); a relief.pitch_mm below {:.3} (now \
-             {pitch_mm}) shows them in full",
-            at.x,
-            at.y,
-            width / 3.0
-        ));
-    }
-    if let Some((n, height, source)) = capped {
-        notes.push(format!(
-            "layer '{name}': slope_cap = {} keeps the ridge of {n} narrow part(s) below height_mm = {}; the \
-             lowest rises to {height:.2} mm ({source})",
-            layer.slope_cap, layer.height_mm
-        ));
-    }
-    if let Some((n, by, source)) = over {
-        notes.push(format!(
-            "layer '{name}': {n} figure(s) reach past the edge of the stock, by up to {by:.2} mm ({source}); \
-             they are cut off there"
-        ));
-    }
-    if let Some((n, source, at, why)) = lost {
-        notes.push(format!(
-            "layer '{name}': {n} part(s) have no skeleton and got the distance profile instead of a crest; the \
-             first: {source}, at {:.1}, {:.1}: {why}",
-            at.x, at.y
-        ));
-    }
-    if let Some((n, source, at, why)) = fell_back {
-        notes.push(format!(
-            "layer '{name}': {n} part(s) got the ratio field because their ruled surface failed a check; the \
-             first: {source}, at {:.1}, {:.1}: {why}",
-            at.x, at.y
-        ));
-    }
-    if remarks.iter().any(|(_, remark)| *remark == Remark::RidgeBelowBase) {
-        notes.push(format!(
-            "layer '{name}': height_mm = {} lies below base_mm = {}; the layer is flat at base_mm",
-            layer.height_mm, layer.base_mm
-        ));
-    }
-}
-
-/// The note on rough outlines: how many, and the one with the most ripples.
-fn tell_rough(name: &str, remarks: &[(&str, Remark)]) -> Option<String> {
-    let rough = remarks.iter().filter_map(|&(source, remark)| match remark {
-        Remark::Rough { ripples, length_mm, at } => Some((ripples, length_mm, source, at)),
-        _ => None,
-    });
-    let rough: Vec<_> = rough.collect();
-    let worst = rough.iter().rev().max_by_key(|one| one.0)?;
-    let (ripples, length, source, at) = *worst;
-    Some(format!(
-        "layer '{name}': the outline of {} part(s) is rough, and its ripples end up in the crest; the worst has {ripples} \
-         of them, about {length:.2} mm long ({source}, at {:.1}, {:.1}); where they are not meant, smooth the path, or \
-         in a picture raise artwork.trace.smooth_px to about their length in pixels",
-        rough.len(),
-        at.x,
-        at.y
-    ))
-}
-
 #[cfg(test)]
 mod figures_tests;
+
+#[cfg(test)]
+mod methods_tests;

@@ -28,9 +28,27 @@ fn artwork(sample: &Path) -> PathBuf {
 }
 
 fn carve(sample: &Path) {
+    carve_with(sample, &[]);
+}
+
+/// Carves a sample, its layers raised by these surface methods in turn (its own where there are none).
+fn carve_with(sample: &Path, methods: &[&str]) {
     let name = name(sample);
     let desk = tempfile::tempdir().unwrap();
     let mut job = std::fs::read_to_string(sample.join(format!("{name}.toml"))).unwrap();
+    if !methods.is_empty() {
+        let mut methods = methods.iter().cycle();
+        // How much cusps its cutters leave is the sample's own affair.
+        let own = |line: &&str| !line.starts_with("surface = ") && *line != "strict = true";
+        let lines = job.lines().filter(own);
+        let lines: Vec<String> = lines
+            .map(|line| match line.starts_with("select = ").then(|| methods.next()).flatten() {
+                Some(method) => format!("{line}\nsurface = \"{method}\""),
+                None => line.to_owned(),
+            })
+            .collect();
+        job = lines.join("\n") + "\n";
+    }
     if std::env::var_os("RELIEVO_SAMPLES").is_none_or(|v| v != "full") {
         let at = job.find("pitch_mm = ").expect("a sample says its pitch");
         let end = at + job[at..].find('\n').unwrap();
@@ -85,6 +103,25 @@ fn mountains_carve() {
 #[test]
 fn tiger_carves() {
     carve(&samples().into_iter().find(|s| name(s) == "tiger").unwrap());
+}
+
+/// Every surface method takes its turn on a layer of the lotus.
+#[test]
+fn the_lotus_carves_with_every_surface_method() {
+    let lotus = samples().into_iter().find(|s| name(s) == "lotus").unwrap();
+    for methods in [
+        ["butterfly", "loop", "sqrt3", "catmull-clark", "doo-sabin"],
+        ["patches", "harmonic", "teddy", "r-function", "scan-lines"],
+        ["ruled", "butterfly-original", "ratio", "butterfly", "profile"],
+    ] {
+        carve_with(&lotus, &methods);
+    }
+}
+
+#[test]
+fn the_celtic_square_carves_as_a_butterfly_surface() {
+    let square = samples().into_iter().find(|s| name(s) == "celtic-square").unwrap();
+    carve_with(&square, &["butterfly"]);
 }
 
 #[test]

@@ -3,7 +3,6 @@
 use super::files::{self, Outputs};
 use super::observe::{self, Stages};
 use super::{Stop, inputs, memory, outcome};
-use crate::job::SurfaceSpec;
 use crate::outline::Region;
 use crate::report::skeleton_svg;
 use crate::surface::{Fineness, Skeleton};
@@ -87,9 +86,7 @@ fn skeletons(design: &Design) -> Vec<(String, String)> {
     let fineness = Fineness::of(job.relief.pitch_mm, job.tolerance.chord_mm);
     let mut pictures = Vec::new();
     for (k, (layer, outline)) in job.layers.iter().zip(&design.outlines.layers).enumerate() {
-        let (SurfaceSpec::Ruled(crest) | SurfaceSpec::Ratio(crest)) = &layer.surface else {
-            continue;
-        };
+        let Some(crest) = layer.surface.crest() else { continue };
         let regions: Vec<&Region> = outline.figures.iter().flat_map(|f| &f.regions).collect();
         let parts: Vec<_> = regions
             .into_iter()

@@ -182,12 +182,13 @@ fn layers(carving: &Carving) -> Vec<LayerRow> {
             SurfaceSpec::Profile { profile, .. } => {
                 format!("profile, {}", format!("{profile:?}").to_lowercase())
             }
-            SurfaceSpec::Ruled(crest) => {
-                format!("ruled, {}", format!("{:?}", crest.profile).to_lowercase())
+            SurfaceSpec::Ruled(crest)
+            | SurfaceSpec::Ratio(crest)
+            | SurfaceSpec::Harmonic(crest) => {
+                let profile = format!("{:?}", crest.profile).to_lowercase();
+                format!("{}, {profile}", spec.surface.method())
             }
-            SurfaceSpec::Ratio(crest) => {
-                format!("ratio, {}", format!("{:?}", crest.profile).to_lowercase())
-            }
+            other => other.method().to_owned(),
         },
         combine: format!("{:?}", spec.combine).to_lowercase(),
         figures: outlines.figures.len(),

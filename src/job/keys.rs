@@ -145,7 +145,26 @@ pub(super) const COMBINES: &[&str] =
 /// Names of [`super::CutterShape`], in its order.
 pub(super) const SHAPES: &[&str] = &["flat", "ball", "bull", "v", "tapered", "table"];
 /// Surface methods that there are.
-pub(super) const METHODS: &[&str] = &["ruled", "ratio", "profile"];
+pub(super) const METHODS: &[&str] = &[
+    "ruled",
+    "ratio",
+    "profile",
+    "harmonic",
+    "teddy",
+    "r-function",
+    "scan-lines",
+    "patches",
+    "butterfly",
+    "butterfly-original",
+    "loop",
+    "sqrt3",
+    "catmull-clark",
+    "doo-sabin",
+];
+/// Names of [`super::ScanShape`], in its order.
+pub(super) const SCAN_SHAPES: &[&str] = &["bell", "parabola"];
+/// Names of [`super::Control`], in its order.
+pub(super) const CONTROLS: &[&str] = &["even", "split", "quad4", "quad6"];
 /// Names of [`super::Prune`], in its order.
 pub(super) const PRUNES: &[&str] = &["inscribed", "half-disc"];
 /// Names of [`super::Split`], in its order.
@@ -535,7 +554,7 @@ pub(super) static LAYER: Section = Section {
         key(
             "surface",
             Kind::Forms(
-                "\"ruled\", \"ratio\", \"profile\" or { method = \"ruled\", profile = \"parabola\", ... }",
+                "\"ruled\", \"ratio\", \"profile\", another method or { method = \"ruled\", profile = \"parabola\", ... }",
             ),
             Text("ruled"),
             "how the surface is made from the outline",
@@ -597,17 +616,70 @@ pub(super) static SURFACE: Section = Section {
     keys: &[
         key(
             "method",
-            Kind::Forms("\"ruled\", \"ratio\" or \"profile\""),
+            Kind::Forms(
+                "\"ruled\", \"ratio\", \"profile\", \"harmonic\", \"teddy\", \"r-function\", \"scan-lines\", \"patches\", \"butterfly\", \"butterfly-original\", \"loop\", \"sqrt3\", \
+                 \"catmull-clark\" or \"doo-sabin\"",
+            ),
             Text("ruled"),
             "ruled: a level crest over the spine, ruled down to the outline; ratio: the same as a field; \
-             profile: height by the distance to the outline",
+             profile: height by the distance to the outline; harmonic: smoother than ratio; teddy: inflated, as high \
+             as it is wide; r-function: soft hips; scan-lines: by the middles of lines across; patches: parabolas without the ruled surface's \
+             care for seams; the others: subdivision of a mesh over the spine, of which only butterfly and \
+             butterfly-original rise to height_mm",
         ),
-        key("profile", Kind::Choice(PROFILES), Text("parabola"), "cross-section of the flank"),
+        key(
+            "profile",
+            Kind::Choice(PROFILES),
+            Text("parabola"),
+            "cross-section of the flank (ruled, ratio, harmonic, profile, r-function)",
+        ),
         key(
             "radius_mm",
             mm(0.01, LENGTH),
             Rule("half the width of each figure"),
             "profile only: the flank ends and a flat top begins this far inside",
+        ),
+        key(
+            "order",
+            Kind::Whole { min: 1, max: 8 },
+            Number(2.0),
+            "r-function only: the larger, the nearer to the distance profile",
+        ),
+        key(
+            "directions",
+            Kind::Whole { min: 1, max: 32 },
+            Number(8.0),
+            "scan-lines only: number of directions; 1 = rows along x, each by itself",
+        ),
+        key(
+            "shape",
+            Kind::Choice(SCAN_SHAPES),
+            Text("bell"),
+            "scan-lines only: cross-section, a normal distribution or the parabola",
+        ),
+        key(
+            "levels",
+            Kind::Whole { min: 1, max: 12 },
+            Rule("until edges are about two cells long"),
+            "subdivision: how many times the mesh is refined",
+        ),
+        key(
+            "adaptive_mm",
+            mm(0.0001, 10.0),
+            Rule("refined everywhere"),
+            "butterfly only: refine only where the surface bends by more than this",
+        ),
+        key(
+            "control",
+            Kind::Choice(CONTROLS),
+            Text("even"),
+            "subdivision: the mesh it starts from: even rungs, or sleeves split or paired in 4 or 6 triangles",
+        ),
+        key(
+            "ridge_true",
+            Kind::Flag,
+            Flag(false),
+            "patches only: the ridge on the spine, not half way to the chord",
         ),
         key(
             "width_power",

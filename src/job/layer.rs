@@ -10,10 +10,11 @@ use super::error::{JobError, Source, nearest, shown};
 use super::keys::{Key, LAYER, METHODS, PROFILES, SLOPE_CAP, SURFACE, rule};
 use super::reader::{Table, as_number};
 use super::settle::{TOUCHING_MM, round};
-use super::types::{
-    Combine, CrestSpec, Found, FoundLayer, Join, LayerSpec, Profile, Prune, Rgb, Selector,
-    Significance, SkeletonSpec, Split, SurfaceSpec,
+use super::surface::{
+    Control, CrestSpec, Join, Profile, Prune, ScanShape, Scheme, Significance, SkeletonSpec, Split,
+    SubdivisionSpec, SurfaceSpec,
 };
+use super::types::{Combine, Found, FoundLayer, LayerSpec, Rgb, Selector};
 
 /// A layer whose height may still be open.
 #[derive(Debug, Clone, PartialEq)]
@@ -199,18 +200,17 @@ fn read_slope_cap(table: &Table<'_>) -> Result<f64, JobError> {
 }
 
 fn read_surface(layer: &Table<'_>) -> Result<SurfaceSpec, JobError> {
-    let plain = |method: &str| match method {
-        "profile" => SurfaceSpec::Profile { profile: Profile::Parabola, radius_mm: None },
-        "ratio" => SurfaceSpec::Ratio(CrestSpec::default()),
-        _ => SurfaceSpec::Ruled(CrestSpec::default()),
+    let plain = |method: &str| {
+        let (source, nothing) = (Source::default(), DeTable::new());
+        surface_of(&Table::unchecked(&source, &SURFACE, &nothing), method)
     };
     let Some(value) = layer.raw("surface") else {
-        return Ok(plain(layer.text("surface").unwrap_or_default()));
+        return plain(layer.text("surface").unwrap_or_default());
     };
     let DeValue::Table(values) = value.get_ref() else {
         let method = text_or_form(layer, "surface")?;
         check_method(layer, method, None)?;
-        return Ok(plain(method));
+        return plain(method);
     };
     // The method comes first: another method's own keys would only mislead.
     let method = values.get("method").and_then(|method| method.get_ref().as_str());
@@ -219,24 +219,84 @@ fn read_surface(layer: &Table<'_>) -> Result<SurfaceSpec, JobError> {
     }
     let table = layer.table("surface", &SURFACE).expect("the table is given")?;
     let method = text_or_form(&table, "method")?;
+    let foreign = |key: &Key| !uses(method, key.name) && table.raw(key.name).is_some();
+    if let Some(key) = SURFACE.keys.iter().find(|key| foreign(key)) {
+        let message = format!("method \"{method}\" does not use {}", key.name);
+        let others = METHODS.iter().filter(|other| uses(other, key.name));
+        let others: Vec<String> = others.map(|other| format!("\"{other}\"")).collect();
+        let help =
+            format!("it belongs to {}: change the method or leave the key out", others.join(", "));
+        return Err(table.impossible(key.name, &message, "without effect", &help));
+    }
+    surface_of(&table, method)
+}
+
+/// True when a surface method uses this key of the surface's table.
+fn uses(method: &str, key: &str) -> bool {
+    let subdivides = Scheme::ALL.iter().any(|scheme| scheme.name() == method);
+    match key {
+        "method" => true,
+        "profile" => {
+            matches!(method, "ruled" | "ratio" | "harmonic" | "profile" | "r-function")
+        }
+        "radius_mm" => method == "profile",
+        "order" => method == "r-function",
+        "directions" | "shape" => method == "scan-lines",
+        "width_power" if method == "teddy" => false,
+        "levels" | "control" => subdivides,
+        "adaptive_mm" => method == Scheme::Butterfly.name(),
+        "ridge_true" => method == "patches",
+        // The patches of the thesis know single junctions and pairs of them only.
+        "junctions" | "join" if method == "patches" => false,
+        _ => !matches!(method, "profile" | "r-function" | "scan-lines"),
+    }
+}
+
+/// The surface of a method by the keys of its table, which are known to be its own.
+fn surface_of(table: &Table<'_>, method: &str) -> Result<SurfaceSpec, JobError> {
     let profiles =
         [Profile::Parabola, Profile::Round, Profile::Chamfer, Profile::Cove, Profile::Ogee];
     let profile = profiles[table.choice("profile")];
-    let foreign = |key: &Key| {
-        let own = if key.name == "radius_mm" { method == "profile" } else { method != "profile" };
-        !own && !["method", "profile"].contains(&key.name) && table.raw(key.name).is_some()
-    };
-    if let Some(key) = SURFACE.keys.iter().find(|key| foreign(key)) {
-        let message = format!("method \"{method}\" does not use {}", key.name);
-        let others = if method == "profile" { "\"ruled\" and \"ratio\"" } else { "\"profile\"" };
-        let help = format!("it belongs to {others}: change the method or leave the key out");
-        return Err(table.impossible(key.name, &message, "without effect", &help));
+    match method {
+        "profile" => {
+            return Ok(SurfaceSpec::Profile { profile, radius_mm: table.number("radius_mm") });
+        }
+        "r-function" => {
+            let order = table.sure_number("order") as u32;
+            return Ok(SurfaceSpec::RFunction { profile, order });
+        }
+        "scan-lines" => {
+            let shape = [ScanShape::Bell, ScanShape::Parabola][table.choice("shape")];
+            let directions = table.sure_number("directions") as u32;
+            return Ok(SurfaceSpec::ScanLines { directions, shape });
+        }
+        _ => {}
     }
-    if method == "profile" {
-        return Ok(SurfaceSpec::Profile { profile, radius_mm: table.number("radius_mm") });
+    let crest = read_crest(table, profile)?;
+    if let Some(&scheme) = Scheme::ALL.iter().find(|scheme| scheme.name() == method) {
+        let controls = [Control::Even, Control::Split, Control::Quad4, Control::Quad6];
+        return Ok(SurfaceSpec::Subdivision(SubdivisionSpec {
+            scheme,
+            levels: table.number("levels").map(|levels| levels as u32),
+            adaptive_mm: table.number("adaptive_mm"),
+            control: controls[table.choice("control")],
+            crest,
+        }));
     }
-    let crest = read_crest(&table, profile)?;
-    Ok(if method == "ratio" { SurfaceSpec::Ratio(crest) } else { SurfaceSpec::Ruled(crest) })
+    Ok(match method {
+        "ratio" => SurfaceSpec::Ratio(crest),
+        "harmonic" => SurfaceSpec::Harmonic(crest),
+        "teddy" => {
+            SurfaceSpec::Teddy(CrestSpec { profile: Profile::Round, width_power: 1.0, ..crest })
+        }
+        "patches" => {
+            let skeleton =
+                SkeletonSpec { join: Join::Pairs, split: Split::Sleeves, ..crest.skeleton };
+            let crest = CrestSpec { skeleton, ..crest };
+            SurfaceSpec::Patches { ridge_true: table.flag("ridge_true"), crest }
+        }
+        _ => SurfaceSpec::Ruled(crest),
+    })
 }
 
 /// The keys of the methods with a crest.

@@ -466,3 +466,55 @@ fn crest_surfaces_are_read() {
     let significance = Some(Significance { abs_mm: None, rel: 0.2 });
     assert_eq!(crest.skeleton.significance, significance);
 }
+
+/// Every method arrives by its name, with the defaults of its keys and with keys of its own, and is written out so that it
+/// is read again.
+#[test]
+fn subdivision_surfaces_and_patches_are_read_and_written() {
+    let read = |surface: &str| {
+        let text = format!("[[layer]]\nselect = \"all\"\nsurface = {surface}\n");
+        let mut first = job(&with(&text)).unwrap();
+        let again = job(&first.to_toml()).unwrap();
+        assert_eq!(again.layers, first.layers);
+        first.layers.remove(0).surface
+    };
+    for (index, name) in keys::METHODS.iter().enumerate() {
+        let surface = read(&format!("\"{name}\""));
+        assert_eq!(surface.method(), *name);
+        assert_eq!(surface, read(&format!("{{ method = \"{name}\" }}")));
+        assert_eq!(serde_json::to_value(&surface).unwrap()["method"], *name);
+        assert_eq!(index > 7, matches!(surface, SurfaceSpec::Subdivision(_)), "{name}");
+    }
+    for scheme in Scheme::ALL {
+        let SurfaceSpec::Subdivision(plain) = read(&format!("\"{}\"", scheme.name())) else {
+            panic!("{scheme:?} subdivides")
+        };
+        let crest = CrestSpec::default();
+        let (levels, adaptive_mm, control) = (None, None, Control::Even);
+        assert_eq!(plain, SubdivisionSpec { scheme, levels, adaptive_mm, control, crest });
+    }
+    for (index, name) in keys::CONTROLS.iter().enumerate() {
+        let SurfaceSpec::Subdivision(spec) = read(&format!(
+            "{{ method = \"butterfly\", levels = 4, adaptive_mm = 0.02, control = \"{name}\", edge_mm = 2 }}"
+        )) else {
+            panic!("it subdivides")
+        };
+        assert_eq!((spec.levels, spec.adaptive_mm), (Some(4), Some(0.02)));
+        assert_eq!((spec.control as usize, spec.crest.skeleton.edge_mm), (index, Some(2.0)));
+        assert_eq!(serde_json::to_value(spec.control).unwrap(), *name);
+    }
+    let surface = read("{ method = \"r-function\", profile = \"ogee\", order = 3 }");
+    assert_eq!(surface, SurfaceSpec::RFunction { profile: Profile::Ogee, order: 3 });
+    let surface = read("{ method = \"scan-lines\", directions = 1, shape = \"parabola\" }");
+    assert_eq!(surface, SurfaceSpec::ScanLines { directions: 1, shape: ScanShape::Parabola });
+    let surface = read("\"scan-lines\"");
+    assert_eq!(surface, SurfaceSpec::ScanLines { directions: 8, shape: ScanShape::Bell });
+    let SurfaceSpec::Teddy(crest) = read("\"teddy\"") else { panic!("it is inflated") };
+    assert_eq!((crest.profile, crest.width_power), (Profile::Round, 1.0));
+    let SurfaceSpec::Patches { ridge_true, crest } =
+        read("{ method = \"patches\", ridge_true = true, width_power = 0.5 }")
+    else {
+        panic!("it is patches")
+    };
+    assert!(ridge_true && crest.skeleton.join == Join::Pairs && crest.width_power == 0.5);
+}

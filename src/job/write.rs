@@ -5,15 +5,15 @@ use std::fmt::Write as _;
 use super::draft::Draft;
 use super::error::JobError;
 use super::keys::{
-    ARTWORK, BACKGROUND, COMBINES, CUTTER, FOLLOWS, Fallback, JOB, JOINS, LAYER, MACHINE, MILLINGS,
-    OPERATION, ORIGINS, PATTERNS, PROFILES, PRUNES, RELIEF, SAFETY, SPLITS, STOCK, SURFACE,
-    Section, TOLERANCE, TOP, TRACE, TRACE_METHODS, WOOD, rule,
+    ARTWORK, BACKGROUND, COMBINES, CONTROLS, CUTTER, FOLLOWS, Fallback, JOB, JOINS, LAYER, MACHINE,
+    MILLINGS, OPERATION, ORIGINS, PATTERNS, PROFILES, PRUNES, RELIEF, SAFETY, SCAN_SHAPES, SPLITS,
+    STOCK, SURFACE, Section, TOLERANCE, TOP, TRACE, TRACE_METHODS, WOOD, rule,
 };
 use super::library::Library;
+use super::surface::{Prune, SkeletonSpec, SurfaceSpec};
 use super::types::{
     Backdrop, Background, Connectivity, CutterShape, CutterSpec, Fit, Found, Job, LayerSpec,
-    Machine, Milling, Operation, OperationKind, Pattern, Place, Prune, SkeletonSpec, Stepover,
-    SurfaceSpec, TraceSpec, Within, Wood,
+    Machine, Milling, Operation, OperationKind, Pattern, Place, Stepover, TraceSpec, Within, Wood,
 };
 use crate::geom::{DVec2, DVec3};
 
@@ -333,7 +333,7 @@ fn safety_lines(job: &Job) -> Vec<Line> {
 }
 
 fn surface_lines(surface: &SurfaceSpec, of_picture: bool) -> Vec<Line> {
-    let (method, crest) = match surface {
+    let crest = match surface {
         SurfaceSpec::Profile { profile, radius_mm } => {
             let mut lines = vec![
                 ("method", quoted("profile")),
@@ -342,14 +342,43 @@ fn surface_lines(surface: &SurfaceSpec, of_picture: bool) -> Vec<Line> {
             lines.extend(radius_mm.map(|radius| ("radius_mm", number(radius))));
             return lines;
         }
-        SurfaceSpec::Ruled(crest) => ("ruled", crest),
-        SurfaceSpec::Ratio(crest) => ("ratio", crest),
+        SurfaceSpec::RFunction { profile, order } => {
+            return vec![
+                ("method", quoted("r-function")),
+                ("profile", quoted(PROFILES[*profile as usize])),
+                ("order", order.to_string()),
+            ];
+        }
+        SurfaceSpec::ScanLines { directions, shape } => {
+            return vec![
+                ("method", quoted("scan-lines")),
+                ("directions", directions.to_string()),
+                ("shape", quoted(SCAN_SHAPES[*shape as usize])),
+            ];
+        }
+        SurfaceSpec::Ruled(crest)
+        | SurfaceSpec::Ratio(crest)
+        | SurfaceSpec::Harmonic(crest)
+        | SurfaceSpec::Teddy(crest)
+        | SurfaceSpec::Patches { crest, .. } => crest,
+        SurfaceSpec::Subdivision(subdivision) => &subdivision.crest,
     };
-    let mut lines =
-        vec![("method", quoted(method)), ("profile", quoted(PROFILES[crest.profile as usize]))];
+    let mut lines = vec![("method", quoted(surface.method()))];
+    match surface {
+        SurfaceSpec::Patches { ridge_true, .. } => {
+            lines.push(("ridge_true", ridge_true.to_string()));
+        }
+        SurfaceSpec::Subdivision(own) => {
+            lines.extend(own.levels.map(|levels| ("levels", levels.to_string())));
+            lines.extend(own.adaptive_mm.map(|mm| ("adaptive_mm", number(mm))));
+            lines.push(("control", quoted(CONTROLS[own.control as usize])));
+        }
+        SurfaceSpec::Teddy(_) => {}
+        _ => lines.push(("profile", quoted(PROFILES[crest.profile as usize]))),
+    }
     // What differs from the defaults; the rest would bury it.
     let (plain, own) = (SkeletonSpec::default(), &crest.skeleton);
-    if crest.width_power > 0.0 {
+    if crest.width_power > 0.0 && !matches!(surface, SurfaceSpec::Teddy(_)) {
         lines.push(("width_power", number(crest.width_power)));
     }
     if !crest.along.is_empty() {
@@ -370,7 +399,8 @@ fn surface_lines(surface: &SurfaceSpec, of_picture: bool) -> Vec<Line> {
     if own.split != plain.split {
         lines.push(("junctions", quoted(SPLITS[own.split as usize])));
     }
-    if own.join != plain.join {
+    // The patches of the thesis have no choice of it.
+    if own.join != plain.join && !matches!(surface, SurfaceSpec::Patches { .. }) {
         lines.push(("join", quoted(JOINS[own.join as usize])));
     }
     // Layers of pictures have one by default.

@@ -26,7 +26,7 @@ use super::coverage::{coverage, samples};
 use super::raster::{Bands, rasterise, window_of};
 use super::{Relief, ReliefError};
 use crate::geom::{Bounds, DVec2, Grid, Heightfield};
-use crate::job::{Background, Combine, Job, LayerSpec, SurfaceSpec};
+use crate::job::{Background, Combine, Job, LayerSpec};
 use crate::outline::{Figure, Outlines};
 use crate::surface::{
     FINE, FINE_ROWS, Mesh, Patch, Segments, Surface, Window, averaged, finer, inside_spans,
@@ -157,10 +157,7 @@ struct Holes {
 
 impl Holes {
     fn of(spec: &LayerSpec, figures: &[Figure]) -> Option<Self> {
-        let (SurfaceSpec::Ruled(crest) | SurfaceSpec::Ratio(crest)) = &spec.surface else {
-            return None;
-        };
-        let base_mm = crest.hole_base_mm.filter(|&mm| mm != spec.base_mm)?;
+        let base_mm = spec.surface.crest()?.hole_base_mm.filter(|&mm| mm != spec.base_mm)?;
         let base_mm = if spec.draft_rad > 0.0 { base_mm.min(0.0) } else { base_mm };
         let regions = || figures.iter().flat_map(|f| &f.regions);
         let outer = Segments::of_rings(regions().map(|r| r.outer.as_slice()));
@@ -266,7 +263,7 @@ fn sampled(
             (finely(&mesh, grid)?, 0)
         }
     };
-    if let SurfaceSpec::Ruled(crest) = &layer.surface {
+    if let Some(crest) = layer.surface.crest() {
         lower_walls(&mut patch, &figure.regions, layer, crest, grid);
     }
     Ok((patch, doubles))

@@ -1,16 +1,20 @@
-//! Surfaces that rise from the outline to a crest over the spine: B+ with the ratio field to fall back on.
+//! Surfaces that rise from the outline to a crest over the spine, with the ratio field to fall back on.
 //!
 //! ```text
-//!   Region -> Skeleton (rings, cells, rungs, spine) -> Heights of the crest -> ruled mesh --checks--> Mesh
-//!                                                                                  \--fail--> ratio field
+//!   Region -> Skeleton (rings, cells, rungs, spine) -> Heights of the crest -> mesh --checks--> Mesh
+//!                                                                            \--fail--> ratio field
 //! ```
 
 use super::profile::{self, Flank};
 use super::ridge::{Heights, Ridge};
 use super::rungs::{Rungs, rungs};
-use super::{FINE, Patch, Remark, Segments, Surface, Window, inscribed_radius, ratio, ruled};
+use super::subdivide::{PolyMesh, adaptive, limit, subdivide};
+use super::{
+    FINE, Mesh, Over, Patch, Remark, Rim, RuledFault, Segments, Surface, Way, Window, control,
+    inscribed_radius, literal, ratio, rim, ruled,
+};
 use crate::geom::{DVec2, Grid, Tolerance};
-use crate::job::{CrestSpec, LayerSpec, SkeletonSpec};
+use crate::job::{CrestSpec, LayerSpec, Scheme, SkeletonSpec, SubdivisionSpec, SurfaceSpec};
 use crate::outline::{Figure, Region};
 use crate::skeleton::{
     Cells, SampleLimits, Sampled, SkeletonError, Spine, Triangulation, midlines, sample, smooth,
@@ -26,6 +30,11 @@ const LEAST_EDGE_CELLS: f64 = 2.0;
 const RIPPLE: f64 = 0.35;
 /// More ripples than this make an outline rough.
 const RIPPLES: usize = 12;
+/// Most levels of subdivision that nobody asked for, and most faces that these may lead to.
+const MOST_LEVELS: f64 = 5.0;
+const MOST_DEFAULT_FACES: usize = 1 << 22;
+/// Levels of a scheme that cuts triangles in four which two steps of Kobbelt's (in nine) stand for.
+const SQRT3_LEVELS: f64 = 1.584_962_500_721_156;
 /// Rounds of smoothing for a spine that no rungs carry.
 const SMOOTH_ROUNDS: usize = 2;
 
@@ -112,21 +121,12 @@ pub fn ridge_of(layer: &LayerSpec, crest: &CrestSpec, rings: usize) -> Ridge {
     }
 }
 
-/// How the crest of a figure is raised.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Method<'a> {
-    /// The layer's crest.
-    pub(super) crest: &'a CrestSpec,
-    /// As a ratio field even where a ruled mesh could be made.
-    pub(super) ratio: bool,
-}
-
-/// Raises every region of a figure. Regions whose ruled mesh fails its checks become ratio fields, and
+/// Raises every region of a figure by the method of its layer. Regions whose mesh fails its checks become ratio fields, and
 /// those without a skeleton distance profiles; remarks say which and why.
 pub(super) fn raise(
     figure: &Figure,
     layer: &LayerSpec,
-    method: Method<'_>,
+    crest: &CrestSpec,
     grid: &Grid,
     tolerance: &Tolerance,
     remarks: &mut Vec<Remark>,
@@ -137,7 +137,7 @@ pub(super) fn raise(
         .with_max_len(1)
         .map(|region| {
             let mut remarks = Vec::new();
-            let part = Part { region, layer, method, grid, tolerance };
+            let part = Part { region, layer, crest, grid, tolerance };
             (part.raise(&mut remarks), remarks)
         })
         .collect();
@@ -178,14 +178,14 @@ fn rough(skeleton: &Skeleton, inscribed_mm: f64, at: DVec2) -> Option<Remark> {
 struct Part<'a> {
     region: &'a Region,
     layer: &'a LayerSpec,
-    method: Method<'a>,
+    crest: &'a CrestSpec,
     grid: &'a Grid,
     tolerance: &'a Tolerance,
 }
 
 impl Part<'_> {
     fn raise(&self, remarks: &mut Vec<Remark>) -> Surface {
-        let Self { region, layer, method, grid, tolerance } = *self;
+        let Self { region, layer, crest, grid, tolerance } = *self;
         let window = Window::around(grid, &region.bounds());
         let segments = Segments::of_rings(region.rings());
         let inscribed = inscribed_radius(region, &segments, profile::RADIUS_CELLS * grid.pitch_mm);
@@ -196,29 +196,56 @@ impl Part<'_> {
         let cell = if narrow { grid.pitch_mm / FINE as f64 } else { grid.pitch_mm };
         let fineness = Fineness::of(cell, tolerance.chord_mm);
         let at = region.bounds().center();
-        let skeleton = match Skeleton::of(region, &method.crest.skeleton, &fineness) {
+        let skeleton = match Skeleton::of(region, &crest.skeleton, &fineness) {
             Ok(skeleton) => skeleton,
             Err(why) => {
                 remarks.push(Remark::NoSkeleton { at, why });
-                let flank = Flank::of(layer, method.crest.profile, None);
+                let flank = Flank::of(layer, crest.profile, None);
                 let figure = Figure { source: String::new(), regions: vec![region.clone()] };
                 return Surface::Field(profile::raise(&figure, &flank, grid, &mut Vec::new()));
             }
         };
         remarks.extend(rough(&skeleton, inscribed, at));
-        let ridge = ridge_of(layer, method.crest, region.holes.len() + 1);
+        let ridge = ridge_of(layer, crest, region.holes.len() + 1);
         let heights = ridge.heights(&skeleton.spine);
         self.remark_cap(&heights, remarks);
-        if !method.ratio {
-            match skeleton.mesh(&heights, &ridge, &fineness) {
-                Ok(mesh) if narrow => return Surface::Fine(mesh),
-                Ok(mesh) => return Surface::Mesh(mesh),
-                Err(why) => remarks.push(Remark::FellBack { at, why }),
+        let mesh = match &layer.surface {
+            SurfaceSpec::Ruled(_) => Some(skeleton.mesh(&heights, &ridge, &fineness)),
+            SurfaceSpec::Patches { ridge_true, .. } => {
+                let over = if *ridge_true { Over::Ridge } else { Over::Control };
+                Some(skeleton.patches(&ridge, over, &fineness))
             }
+            SurfaceSpec::Subdivision(spec) => {
+                Some(skeleton.subdivided(&ridge, spec, cell).map(|raised| {
+                    let Subdivided { mesh, covered, smoothed } = raised;
+                    if covered < 1.0 - ruled::AREA {
+                        remarks.push(Remark::DrawnIn { covered });
+                    }
+                    if smoothed > 0 {
+                        remarks.push(Remark::Unfolded {
+                            part: smoothed as f64 / mesh.vertices.len() as f64,
+                        });
+                    }
+                    mesh
+                }))
+            }
+            _ => None,
+        };
+        match mesh {
+            Some(Ok(mesh)) if narrow => return Surface::Fine(mesh),
+            Some(Ok(mesh)) => return Surface::Mesh(mesh),
+            Some(Err(why)) => remarks.push(Remark::FellBack { at, why }),
+            None => {}
         }
-        let draw = if narrow { ratio::field_finely } else { ratio::field };
-        let mut patch = draw(region, &skeleton.spine, &heights, &ridge, grid, &window);
-        lower_walls(&mut patch, std::slice::from_ref(region), layer, method.crest, grid);
+        let spine = &skeleton.spine;
+        let mut patch = match layer.surface {
+            _ if narrow => ratio::field_finely(region, spine, &heights, &ridge, grid, &window),
+            SurfaceSpec::Harmonic(_) => {
+                ratio::field_of(Way::Laplace, region, spine, &heights, &ridge, grid, &window)
+            }
+            _ => ratio::field(region, spine, &heights, &ridge, grid, &window),
+        };
+        lower_walls(&mut patch, std::slice::from_ref(region), layer, crest, grid);
         Surface::Field(patch)
     }
 
@@ -226,7 +253,7 @@ impl Part<'_> {
     fn remark_cap(&self, heights: &Heights, remarks: &mut Vec<Remark>) {
         let points = heights.branches.iter().flatten().chain(&heights.nodes);
         let height_mm = points.fold(f64::NEG_INFINITY, |a, &b| a.max(b));
-        let free = self.method.crest.width_power == 0.0 && self.method.crest.along.is_empty();
+        let free = self.crest.width_power == 0.0 && self.crest.along.is_empty();
         if free && self.layer.height_mm - height_mm > profile::TOLD_MM {
             remarks.push(Remark::Capped { height_mm });
         }
@@ -243,9 +270,9 @@ impl Skeleton {
         heights: &Heights,
         ridge: &Ridge,
         fineness: &Fineness,
-    ) -> Result<super::Mesh, ruled::RuledFault> {
+    ) -> Result<Mesh, RuledFault> {
         if let Some(at) = self.rungs.iter().find_map(Rungs::crossing) {
-            return Err(ruled::RuledFault::CrossingRungs { at });
+            return Err(RuledFault::CrossingRungs { at });
         }
         let density =
             ruled::Density { spacing_mm: fineness.spacing_mm, max_facet_mm: fineness.max_facet_mm };
@@ -254,6 +281,78 @@ impl Skeleton {
         ruled::check(&mesh, sampled, ridge)?;
         Ok(mesh)
     }
+
+    /// The patches of the thesis, checked.
+    ///
+    /// # Errors
+    /// Which check failed, and where.
+    pub fn patches(
+        &self,
+        ridge: &Ridge,
+        over: Over,
+        fineness: &Fineness,
+    ) -> Result<Mesh, RuledFault> {
+        let density =
+            ruled::Density { spacing_mm: fineness.spacing_mm, max_facet_mm: fineness.max_facet_mm };
+        let mesh = literal::patches(&self.sampled, &self.cells, ridge, over, &density);
+        ruled::check(&mesh, &self.sampled, ridge)?;
+        Ok(mesh)
+    }
+
+    /// The subdivision surface, checked. Where no number of levels is asked for, edges get about two cells of
+    /// `cell_mm` long; where the scheme folds the plan over itself, as it does between uneven triangles, it is smoothed.
+    ///
+    /// # Errors
+    /// Which check failed, and where. An approximating scheme draws the outline in, so that the area is no fault of
+    /// its mesh.
+    pub fn subdivided(
+        &self,
+        ridge: &Ridge,
+        spec: &SubdivisionSpec,
+        cell_mm: f64,
+    ) -> Result<Subdivided, RuledFault> {
+        let control = control(&self.sampled, &self.cells, ridge, spec.control, Rim::Curve);
+        let levels = spec.levels.unwrap_or_else(|| levels(&control, spec.scheme, cell_mm));
+        let fine = match spec.adaptive_mm {
+            Some(tolerance_mm) => adaptive(&control, tolerance_mm, levels),
+            None => subdivide(&control, spec.scheme, levels),
+        };
+        let settled = fine.and_then(|fine| limit(&fine, spec.scheme));
+        let mut mesh = settled.map_err(RuledFault::Subdivision)?.to_triangles();
+        if spec.scheme.interpolates() {
+            rim::follow(&mut mesh, &control, &self.sampled);
+        }
+        // Folds that are left are found by the check.
+        let smoothed = mesh.unfold().unwrap_or(0);
+        let covered = ruled::check_but_area(&mesh, &self.sampled, ridge)?;
+        if spec.scheme.interpolates() {
+            ruled::check_area(covered, &self.sampled)?;
+        }
+        Ok(Subdivided { mesh, covered: covered / ruled::area_of(&self.sampled), smoothed })
+    }
+}
+
+/// A subdivision surface over a region.
+#[derive(Debug, Clone)]
+pub struct Subdivided {
+    /// Its mesh.
+    pub mesh: Mesh,
+    /// Its area over that of the region.
+    pub covered: f64,
+    /// Number of vertices that were smoothed because the mesh folded over itself.
+    pub smoothed: usize,
+}
+
+/// How many times a mesh is to be refined until its edges are about two cells long: as long as it does not get too
+/// large, at most five times (Kobbelt's scheme: two steps for every one and a half).
+fn levels(control: &PolyMesh, scheme: Scheme, cell_mm: f64) -> u32 {
+    let at = |v: u32| control.vertices[v as usize].truncate();
+    let sides = control.faces().flat_map(|f| f.iter().zip(f.iter().cycle().skip(1)));
+    let longest = sides.map(|(&a, &b)| at(a).distance(at(b))).fold(0.0, f64::max);
+    let wanted = libm::log2(longest / (LEAST_EDGE_CELLS * cell_mm)).ceil();
+    let room = libm::log2((MOST_DEFAULT_FACES / control.len().max(1)).max(1) as f64) / 2.0;
+    let levels = wanted.clamp(1.0, MOST_LEVELS).min(room.floor().max(1.0));
+    if scheme == Scheme::Sqrt3 { 2 * (levels / SQRT3_LEVELS).ceil() as u32 } else { levels as u32 }
 }
 
 /// Lowers a surface whose outline lies at its base to walls with the layer's draft: `b` becomes

@@ -152,7 +152,7 @@ fn an_annulus_has_even_rungs_and_the_exact_height() {
 }
 
 /// Numbers in 0..1 from a fixed seed.
-struct Noise(u64);
+pub(super) struct Noise(pub(super) u64);
 
 impl Noise {
     fn next(&mut self) -> f64 {
@@ -162,7 +162,7 @@ impl Noise {
 }
 
 /// A random blob by Fourier waves; every third with a hole.
-fn blob(k: u32, noise: &mut Noise) -> crate::outline::Region {
+pub(super) fn blob(k: u32, noise: &mut Noise) -> crate::outline::Region {
     let waves: Vec<[f64; 2]> =
         (2..8).map(|m| [0.9 * noise.next() / f64::from(m), TAU * noise.next()]).collect();
     let radius = |a: f64| {
@@ -265,10 +265,15 @@ fn hubs_are_raised() {
 
 /// A layer over one figure at a pitch of 0.15 mm: its surfaces and notes.
 fn raise_figure(ring: Ring, surface: SurfaceSpec) -> (Vec<Vec<Surface>>, Vec<String>) {
-    let figure = Figure {
-        source: "path 'p'".into(),
-        regions: vec![crate::outline::Region { outer: ring, holes: vec![] }],
-    };
+    raise_region(crate::outline::Region { outer: ring, holes: vec![] }, surface)
+}
+
+/// The same for a region.
+pub(super) fn raise_region(
+    region: crate::outline::Region,
+    surface: SurfaceSpec,
+) -> (Vec<Vec<Surface>>, Vec<String>) {
+    let figure = Figure { source: "path 'p'".into(), regions: vec![region] };
     let layer = OutlineLayer { name: "layer".into(), figures: vec![figure] };
     let outlines = Outlines { layers: vec![layer], notes: vec![] };
     let spec = LayerSpec {

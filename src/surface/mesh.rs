@@ -1,9 +1,14 @@
 //! Triangle meshes and their invariants.
 
 use crate::geom::{Bounds, DVec2, DVec3, orient};
+use rayon::prelude::*;
 
 /// A triangle may be turned over by round-off: this area over the square of the mesh's diagonal in plan.
 const TURNED: f64 = 1e-14;
+
+/// Most rounds of smoothing where a mesh folds over itself, and after how many more vertices take part.
+const UNFOLD_ROUNDS: usize = 96;
+const WIDEN_EVERY: usize = 8;
 
 /// A triangle mesh, mm: z is the height above the layer's reference plane.
 #[derive(Debug, Clone, Default)]
@@ -113,6 +118,41 @@ impl Mesh {
         rim
     }
 
+    /// Smooths the mesh where it folds over itself in plan, until no triangle is turned over: the vertices of turned
+    /// triangles, and further ones round them while that does not help, go to the mean of their neighbours. The rim stays.
+    /// Gives the number of vertices that moved, or `None` when folds are left.
+    pub(super) fn unfold(&mut self) -> Option<usize> {
+        let edges = Edges::of(self);
+        let mut fixed = vec![false; self.vertices.len()];
+        self.rim().into_iter().flatten().for_each(|v| fixed[v as usize] = true);
+        let mut loose: Vec<u32> = Vec::new();
+        for round in 0..UNFOLD_ROUNDS {
+            let turned = |face: &&[u32; 3]| {
+                let [a, b, c] = face.map(|v| self.plan(v));
+                orient(a, b, c) < 0.0
+            };
+            let turned: Vec<[u32; 3]> = self.faces.par_iter().filter(turned).copied().collect();
+            if turned.is_empty() {
+                return Some(loose.len());
+            }
+            let mut reach: Vec<u32> = turned.concat();
+            if round % WIDEN_EVERY == WIDEN_EVERY - 1 {
+                reach.extend(loose.iter().flat_map(|&v| edges.from(v)));
+            }
+            loose.extend(reach.into_iter().filter(|&v| !fixed[v as usize]));
+            loose.sort_unstable();
+            loose.dedup();
+            let mean = |&v: &u32| {
+                let ring = edges.from(v);
+                let sum: DVec3 = ring.iter().map(|&w| self.vertices[w as usize]).sum();
+                sum / ring.len() as f64
+            };
+            let moved: Vec<DVec3> = loose.par_iter().map(mean).collect();
+            loose.iter().zip(moved).for_each(|(&v, at)| self.vertices[v as usize] = at);
+        }
+        None
+    }
+
     /// A vertex seen from above.
     fn plan(&self, v: u32) -> DVec2 {
         self.vertices[v as usize].truncate()
@@ -208,6 +248,33 @@ mod tests {
         let mut m = two_triangles();
         m.vertices[1] = DVec3::new(2.0, 2.0, 0.0);
         assert_eq!(m.check(), Ok(()));
+    }
+
+    /// A board of 7 x 7 vertices whose middle was drawn beyond its neighbours.
+    #[test]
+    fn folds_are_smoothed_and_the_rim_stays() {
+        let mut m = Mesh::default();
+        for k in 0..49_u32 {
+            m.vertices.push(DVec3::new(f64::from(k % 7), f64::from(k / 7), 1.0));
+        }
+        for j in 0..6 {
+            for k in 7 * j..7 * j + 6 {
+                m.faces.extend([[k, k + 1, k + 8], [k, k + 8, k + 7]]);
+            }
+        }
+        let flat = m.clone();
+        assert_eq!(m.unfold(), Some(0));
+        m.vertices[24] = DVec3::new(4.6, 3.3, 2.0);
+        m.vertices[25] = DVec3::new(3.1, 3.0, 1.5);
+        assert!(matches!(m.check(), Err(MeshError::Clockwise { .. })));
+        assert!(m.unfold().is_some_and(|n| (2..26).contains(&n)));
+        assert_eq!(m.check(), Ok(()));
+        let still = |k: &usize| !(1..6).contains(&(k % 7)) || !(1..6).contains(&(k / 7));
+        assert!((0..49).filter(still).all(|k| m.vertices[k] == flat.vertices[k]));
+        // A rim that crosses itself cannot be helped.
+        let mut m = two_triangles();
+        m.vertices[1] = DVec3::new(0.0, 3.0, 0.0);
+        assert_eq!(m.unfold(), None);
     }
 
     #[test]

@@ -23,8 +23,36 @@ use rayon::prelude::*;
 
 /// Nodes this near to the spine have its height, in cells: a line passes one at least as near.
 const ON_SPINE_CELLS: f64 = 0.71;
+/// Nodes this near to outline or spine are held, in cells: a little more than one, for those exactly as far.
+const HELD_CELLS: f32 = 1.01;
+/// How often the nodes beside outline and spine are set anew by those that they hold.
+const HOLDING_ROUNDS: usize = 2;
 /// Rows that a band of fine samples sees beyond its edges: 4 cells, more than a narrow region is wide.
 const HALO: usize = 16;
+
+/// How far a node is on its way from the outline to the spine.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Way {
+    /// By the distances to both.
+    Distances,
+    /// By the Laplace equation, 0 on the outline and 1 on the spine: the smoothest.
+    Laplace,
+}
+
+/// As [`field()`], the part of the way found as asked for.
+pub fn field_of(
+    way: Way,
+    region: &Region,
+    spine: &Spine,
+    heights: &Heights,
+    ridge: &Ridge,
+    grid: &Grid,
+    window: &Window,
+) -> Patch {
+    let ratio = Ratio { way, ..Ratio::new(region, spine, heights, ridge) };
+    let Window { i0, j0, nx, ny } = *window;
+    Patch { i0, j0, nx, ny, z: ratio.heights(grid, window) }
+}
 
 /// Heights over one region at the nodes of the window that lie inside it: finite, continuous, at most the
 /// highest of ridge and bases; NaN outside. `heights` are those of `ridge` over `spine`.
@@ -36,9 +64,7 @@ pub fn field(
     grid: &Grid,
     window: &Window,
 ) -> Patch {
-    let z = Ratio::new(region, spine, heights, ridge).heights(grid, window);
-    let Window { i0, j0, nx, ny } = *window;
-    Patch { i0, j0, nx, ny, z }
+    field_of(Way::Distances, region, spine, heights, ridge, grid, window)
 }
 
 /// As [`field`], for regions less than about three cells wide: sampled four times finer, and each node gets
@@ -64,6 +90,7 @@ pub fn field_finely(
 
 /// All that the heights over one region depend on.
 struct Ratio<'a> {
+    way: Way,
     region: &'a Region,
     ridge: &'a Ridge,
     /// The rings by base.
@@ -84,7 +111,8 @@ impl<'a> Ratio<'a> {
         };
         let crest = Crest::new(spine, heights);
         let spine = Segments::of_lines(crest.lines.iter().map(|line| line.0.as_slice()));
-        Self { region, ridge, outlines: bases.iter().map(outline).collect(), spine, crest }
+        let way = Way::Distances;
+        Self { way, region, ridge, outlines: bases.iter().map(outline).collect(), spine, crest }
     }
 
     /// Heights at the nodes of the window, row-major; NaN outside the region.
@@ -106,21 +134,71 @@ impl<'a> Ratio<'a> {
             let rows = inside_spans(self.region.rings(), grid, window);
             self.crest.spread(&rows, grid, window)
         });
+        let part = |k: usize, d_b: f64| {
+            if d_b > 0.0 { d_b / (d_b + f64::from(to_spine[k])) } else { 0.0 }
+        };
+        let settled = (self.way == Way::Laplace).then(|| {
+            let to_outline: Vec<f32> =
+                (0..window.len()).map(|k| outline(&to_rings, k).0 as f32).collect();
+            laplace([&to_outline, &to_spine], window.nx, grid.pitch_mm as f32)
+        });
         z.par_chunks_mut(window.nx).enumerate().for_each(|(j, z)| {
             for (i, z) in z.iter_mut().enumerate() {
                 let k = j * window.nx + i;
-                let d_s = f64::from(to_spine[k]);
-                if d_s.is_nan() {
+                if to_spine[k].is_nan() {
                     continue;
                 }
                 let (d_b, base) = outline(&to_rings, k);
                 let h = level.or_else(|| crest.as_ref().map(|h| f64::from(h[k]))).unwrap_or(base);
-                let u = if d_b > 0.0 { d_b / (d_b + d_s) } else { 0.0 };
+                let u = settled.as_ref().map_or_else(|| part(k, d_b), |u| f64::from(u[k]));
                 *z = (base + (h - base).max(0.0) * profile_at(self.ridge.profile, u)) as f32;
             }
         });
         z
     }
+}
+
+/// The part of the way from the outline to the spine that solves the Laplace equation, by the distances to both (NaN
+/// outside), row-major.
+///
+/// Nodes up to a cell from either are held (so that every node with a neighbour outside is): at first where the distances put them, then twice on the straight line
+/// between the outline (or spine) and the neighbour farthest from it, so that they bend as little as what they hold.
+fn laplace(distances: [&[f32]; 2], nx: usize, cell: f32) -> Vec<f32> {
+    let [d_b, d_s] = distances;
+    let n = d_b.len();
+    let held = |k: usize| d_b[k].min(d_s[k]) <= HELD_CELLS * cell;
+    let mut part: Vec<f32> =
+        (0..n).map(|k| if d_b[k] > 0.0 { d_b[k] / (d_b[k] + d_s[k]) } else { 0.0 }).collect();
+    for round in 0..=HOLDING_ROUNDS {
+        let mut u = part.clone();
+        if round > 0 {
+            let straight = |k: usize| {
+                let (near, far) = if d_b[k] <= d_s[k] { (d_b, 0.0) } else { (d_s, 1.0) };
+                let (i, j) = (k % nx, k / nx);
+                let rows = j.saturating_sub(1)..(j + 2).min(n / nx);
+                let ring = rows
+                    .flat_map(|j| (i.saturating_sub(1)..(i + 2).min(nx)).map(move |i| j * nx + i));
+                let inner = ring.filter(|&q| near[q] > near[k]);
+                let inner = inner.max_by(|&a, &b| near[a].total_cmp(&near[b]).then(b.cmp(&a)));
+                inner.map_or(part[k], |q| far + (part[q] - far) * near[k] / near[q])
+            };
+            let held: Vec<usize> = (0..n).filter(|&k| !d_s[k].is_nan() && held(k)).collect();
+            let moved: Vec<f32> = held.par_iter().map(|&k| straight(k)).collect();
+            held.iter().zip(moved).for_each(|(&k, u_k)| u[k] = u_k);
+        }
+        for (k, u) in u.iter_mut().enumerate() {
+            *u = if d_s[k].is_nan() {
+                f32::NAN
+            } else if held(k) {
+                *u
+            } else {
+                FREE
+            };
+        }
+        harmonic::spread(&mut u, nx);
+        part = u;
+    }
+    part
 }
 
 /// Distance to the outline and its base, as node `k` sees them.

@@ -16,7 +16,7 @@
 use super::crest::Crest;
 use super::kite::Kite;
 use super::weld::Soup;
-use super::{Heights, Mesh, MeshError, Ridge, Rungs, profile_at};
+use super::{Heights, Mesh, MeshError, Ridge, Rungs, SubdivideError, profile_at};
 use crate::geom::{DVec2, DVec3, bounds_of, distance_to_segment, orient, signed_area};
 use crate::job::Profile;
 use crate::skeleton::{Cells, Hub, Junction, Sampled, Spine};
@@ -35,7 +35,7 @@ const TURNS_ON: f64 = 1e-9;
 /// How far the rim may be off the outline's height, over the figure's diagonal.
 const RIM: f64 = 1e-9;
 /// How far the mesh may be off the figure's area, over that area.
-const AREA: f64 = 0.02;
+pub(super) const AREA: f64 = 0.02;
 
 /// How finely the surface is divided.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -329,6 +329,9 @@ pub enum RuledFault {
         /// The middle of the first one that crosses the next, mm.
         at: DVec2,
     },
+    /// The control mesh cannot be subdivided.
+    #[error("{0}")]
+    Subdivision(SubdivideError),
     /// The mesh has a fault: a triangle is turned over, or two lie on the same side of an edge.
     #[error("{0}")]
     Mesh(MeshError),
@@ -361,6 +364,15 @@ pub enum RuledFault {
 /// # Errors
 /// The first [`RuledFault`], by index.
 pub fn check(mesh: &Mesh, sampled: &Sampled, ridge: &Ridge) -> Result<(), RuledFault> {
+    check_area(check_but_area(mesh, sampled, ridge)?, sampled)
+}
+
+/// The same without the last check; gives the area of the mesh in plan, mm2.
+pub(super) fn check_but_area(
+    mesh: &Mesh,
+    sampled: &Sampled,
+    ridge: &Ridge,
+) -> Result<f64, RuledFault> {
     mesh.check().map_err(RuledFault::Mesh)?;
     let size = bounds_of(&sampled.points).size().length();
     let doubled = |&[a, b, c]: &[u32; 3]| {
@@ -369,7 +381,17 @@ pub fn check(mesh: &Mesh, sampled: &Sampled, ridge: &Ridge) -> Result<(), RuledF
     };
     let area = 0.5 * mesh.faces.iter().map(doubled).sum::<f64>();
     check_rim(mesh, sampled, ridge, RIM * size)?;
-    let figure: f64 = sampled.curves.iter().map(|c| signed_area(c.points())).sum();
+    Ok(area)
+}
+
+/// Area inside the curves of a figure, mm2.
+pub(super) fn area_of(sampled: &Sampled) -> f64 {
+    sampled.curves.iter().map(|c| signed_area(c.points())).sum()
+}
+
+/// The area of a mesh is that of its figure.
+pub(super) fn check_area(area: f64, sampled: &Sampled) -> Result<(), RuledFault> {
+    let figure = area_of(sampled);
     if (area - figure).abs() < AREA * figure {
         Ok(())
     } else {

@@ -44,7 +44,7 @@ impl Soup {
         let quad = |k: usize| {
             let below = first + k / across * columns + k % across + 1;
             let above = below + columns;
-            quad(vertices, [below - 1, below, above, above - 1].map(|k| k as u32))
+            cut_quad(vertices, [below - 1, below, above, above - 1].map(|k| k as u32))
         };
         self.faces.par_extend((0..across * up).into_par_iter().flat_map_iter(quad));
     }
@@ -92,7 +92,7 @@ impl Soup {
 
 /// Cuts a quadrilateral, counter-clockwise, by the diagonal that turns no triangle over; where both or
 /// neither do, by the shorter one in space.
-fn quad(vertices: &[DVec3], [a, b, c, d]: [u32; 4]) -> [[u32; 3]; 2] {
+pub(super) fn cut_quad(vertices: &[DVec3], [a, b, c, d]: [u32; 4]) -> [[u32; 3]; 2] {
     let at = |k: u32| vertices[k as usize];
     let faults = |cut: [[u32; 3]; 2]| cut.map(|t| fault(t.map(at))).iter().sum::<u32>();
     let (one, two) = ([[a, b, c], [a, c, d]], [[a, b, d], [b, c, d]]);

@@ -2,11 +2,13 @@
 
 use super::Shape;
 use relievo::geom::{DVec2, DVec3, Grid, distance_to_segment};
-use relievo::job::{Profile, SkeletonSpec};
+use relievo::job::{Control, Join, Profile, ScanShape, Scheme, SkeletonSpec};
+use relievo::outline::Region;
 use relievo::relief::rasterise;
 use relievo::skeleton::{Class, Sampled, cells, spine, triangulate};
 use relievo::surface::{
-    Fineness, Heights, Mesh, Patch, Ridge, Rungs, Skeleton, Window, ratio_field, rungs,
+    Density, Fineness, Heights, Mesh, Over, Patch, Ridge, Rim, Rise, Rungs, Skeleton, Way, Window,
+    control, crest_field, limit, patches, r_function, rungs, scan_lines, subdivide,
 };
 
 /// Width of the cells that surfaces are measured on.
@@ -14,6 +16,9 @@ const CELL: f64 = 0.02;
 /// Distance of rungs, and parts of a half curve.
 const SPACING: f64 = 0.05;
 const HALF_CURVE: u32 = 16;
+/// Levels of subdivision: one more on even rungs, whose triangles are larger.
+const LEVELS: u32 = 4;
+const SQRT3_STEPS: u32 = 6;
 /// Part of a seam that ends in a corner of the outline that belongs to the hip.
 const HIP: f64 = 0.05;
 
@@ -41,7 +46,18 @@ pub(crate) struct Raised {
 impl Raised {
     /// A shape with a ridge of height 1 over a base of 0.
     pub(crate) fn new(shape: &Shape, outline: Outline, slope_cap: f64, spacing_mm: f64) -> Self {
-        let spec = SkeletonSpec { edge_mm: Some(shape.edge_mm), ..SkeletonSpec::default() };
+        Self::joined(shape, outline, slope_cap, spacing_mm, Join::Clusters)
+    }
+
+    /// The same with junctions merged as asked for.
+    fn joined(
+        shape: &Shape,
+        outline: Outline,
+        slope_cap: f64,
+        spacing_mm: f64,
+        join: Join,
+    ) -> Self {
+        let spec = SkeletonSpec { edge_mm: Some(shape.edge_mm), join, ..SkeletonSpec::default() };
         let parts = f64::from(HALF_CURVE) * SPACING / spacing_mm;
         let fineness = Fineness {
             chord_mm: 0.02,
@@ -78,6 +94,27 @@ impl Raised {
         self.skeleton.mesh(&self.heights, &self.ridge, &self.fineness).expect("a sound mesh")
     }
 
+    /// The patches of the thesis over it.
+    fn patches(&self) -> Mesh {
+        let Self { skeleton, ridge, fineness, .. } = self;
+        let density =
+            Density { spacing_mm: fineness.spacing_mm, max_facet_mm: fineness.max_facet_mm };
+        patches(&skeleton.sampled, &skeleton.cells, ridge, Over::Control, &density)
+    }
+
+    /// A subdivision surface over it.
+    fn subdivided(&self, scheme: Scheme, form: Control) -> Mesh {
+        let Skeleton { sampled, cells, .. } = &self.skeleton;
+        let mesh = control(sampled, cells, &self.ridge, form, Rim::Chord);
+        let levels = match (scheme, form) {
+            (Scheme::Sqrt3, _) => SQRT3_STEPS,
+            (_, Control::Even) => LEVELS + 1,
+            _ => LEVELS,
+        };
+        let fine = subdivide(&mesh, scheme, levels).expect("a sound control mesh");
+        limit(&fine, scheme).expect("a sound mesh").to_triangles()
+    }
+
     /// Numbers of vertices and of triangles of classes T, S and J.
     pub(crate) fn counts(&self) -> [usize; 4] {
         let t = &self.skeleton.triangulation;
@@ -86,12 +123,35 @@ impl Raised {
         [n, of(Class::Terminal), of(Class::Sleeve), of(Class::Junction)]
     }
 
-    /// Its ratio field.
-    pub(crate) fn field(&self, shape: &Shape) -> Patch {
+    /// A field over it.
+    fn field(&self, shape: &Shape, method: Method) -> Patch {
         let grid = grid(shape);
         let window = Window::whole(&grid);
-        let Self { skeleton, heights, ridge, .. } = self;
-        ratio_field(&shape.region, &skeleton.spine, heights, ridge, &grid, &window)
+        let rise = Rise { base_mm: 0.0, height_mm: 1.0 };
+        let crest = |way: Way, ridge: &Ridge| {
+            let (region, spine) = (&shape.region, &self.skeleton.spine);
+            crest_field(way, region, spine, &ridge.heights(spine), ridge, &grid, &window)
+        };
+        match method {
+            Method::Harmonic => crest(Way::Laplace, &self.ridge),
+            Method::Teddy => {
+                let round = Profile::Round;
+                let ridge = Ridge { profile: round, width_power: 1.0, ..self.ridge.clone() };
+                crest(Way::Distances, &ridge)
+            }
+            Method::Scanned(directions, form) => {
+                scan_lines(&shape.region, directions, form, rise, &grid, &window)
+                    .expect("lines run across every shape")
+            }
+            Method::RFunction => {
+                // It depends on the edges: those of the tabled figures.
+                let mut rings = self.skeleton.sampled.rings().map(<[DVec2]>::to_vec);
+                let outer = rings.next().expect("a shape has an outline");
+                let region = Region { outer, holes: rings.collect() };
+                r_function(&region, 2, 1e-9, Profile::Parabola, rise, &grid, &window)
+            }
+            _ => crest(Way::Distances, &self.ridge),
+        }
     }
 
     /// Largest distance of the surface from the height asked for, over the spine.
@@ -132,18 +192,58 @@ pub(crate) enum Method {
     Capped,
     /// Ratio field.
     Ratio,
+    /// The patches of the thesis.
+    Literal,
+    /// A subdivision surface.
+    Subdivided(Scheme, Control),
+    /// Harmonic field.
+    Harmonic,
+    /// Inflated after Teddy.
+    Teddy,
+    /// Scan lines in so many directions.
+    Scanned(u32, ScanShape),
+    /// R-function.
+    RFunction,
 }
 
 impl Method {
     /// All of them.
-    pub(crate) const ALL: [Self; 3] = [Self::Ruled, Self::Capped, Self::Ratio];
+    pub(crate) const ALL: [Self; 17] = [
+        Self::Ruled,
+        Self::Capped,
+        Self::Ratio,
+        Self::Literal,
+        Self::Subdivided(Scheme::Butterfly, Control::Split),
+        Self::Subdivided(Scheme::Butterfly, Control::Quad4),
+        Self::Subdivided(Scheme::Butterfly, Control::Quad6),
+        Self::Subdivided(Scheme::Butterfly, Control::Even),
+        Self::Subdivided(Scheme::Loop, Control::Split),
+        Self::Subdivided(Scheme::Sqrt3, Control::Split),
+        Self::Subdivided(Scheme::CatmullClark, Control::Split),
+        Self::Subdivided(Scheme::DooSabin, Control::Split),
+        Self::Harmonic,
+        Self::Scanned(1, ScanShape::Parabola),
+        Self::Scanned(8, ScanShape::Parabola),
+        Self::Teddy,
+        Self::RFunction,
+    ];
 
     /// Its name in the table.
-    pub(crate) fn name(self) -> &'static str {
+    pub(crate) fn name(self) -> String {
         match self {
-            Self::Ruled => "B+",
-            Self::Capped => "B+ slope cap 4",
-            Self::Ratio => "R ratio field",
+            Self::Ruled => "B+".to_owned(),
+            Self::Capped => "B+ slope cap 4".to_owned(),
+            Self::Ratio => "R ratio field".to_owned(),
+            Self::Literal => "B literal".to_owned(),
+            Self::Harmonic => "Harmonic".to_owned(),
+            Self::Scanned(1, _) => "C1 literal".to_owned(),
+            Self::Scanned(n, _) => format!("C2, {n} directions, parabola"),
+            Self::Teddy => "T Teddy ellipse".to_owned(),
+            Self::RFunction => "F R-function m=2".to_owned(),
+            Self::Subdivided(scheme, Control::Even) => format!("A+ {}", scheme.name()),
+            Self::Subdivided(scheme, Control::Quad4) => format!("A {}, quad4", scheme.name()),
+            Self::Subdivided(scheme, Control::Quad6) => format!("A {}, quad6", scheme.name()),
+            Self::Subdivided(scheme, _) => format!("A {}", scheme.name()),
         }
     }
 
@@ -153,8 +253,35 @@ impl Method {
             Self::Ruled => [0.0008, 0.0014, 0.0033, 0.0007, 0.002, 1.0, 4.55, 60.5, 8.6],
             Self::Capped => [0.0008, 0.0014, 0.0033, 0.0007, 0.0, 1.0, 2.74, 36.5, 8.1],
             Self::Ratio => [0.0001, 0.0002, 0.0030, 0.0000, 0.001, 1.0, 4.39, 33.7, 7.6],
+            Self::Literal => [0.0074, 0.0234, 0.0120, 0.0007, 0.020, 1.0, 5.30, 75.9, 9.0],
+            Self::Harmonic => [0.0262, 0.0564, 0.0509, 0.0182, 0.000, 1.0, 4.51, 17.6, 5.4],
+            Self::Scanned(1, _) => [0.1976, 0.8986, 0.2056, 0.1977, 0.549, 1.0, 16.5, 7231.0, 15.3],
+            Self::Scanned(..) => [0.0020, 0.0065, 0.0044, 0.0001, 0.049, 1.0, 5.46, 54.1, 8.6],
+            Self::Teddy => [0.1468, 0.2500, 0.1454, 0.1872, 0.390, 1.0, 6.74, 760.0, 16.7],
+            Self::RFunction => [0.0596, 0.1507, 0.0840, 0.0777, 0.343, 1.0, 2.41, 15.3, 5.6],
+            Self::Subdivided(scheme, form) => match scheme {
+                Scheme::Butterfly | Scheme::ButterflyOriginal if form == Control::Even => {
+                    [0.0032, 0.0197, 0.0232, 0.0482, 0.081, 1.145, 5.26, 41.2, 8.4]
+                }
+                Scheme::Butterfly | Scheme::ButterflyOriginal => {
+                    [0.0801, 0.2519, 0.0918, 0.0038, 0.097, 1.151, 5.29, 133.6, 17.5]
+                }
+                Scheme::Loop => [0.2729, 0.3418, 0.2726, 0.2752, 0.362, 1.0, 2.88, 12.1, 5.9],
+                Scheme::Sqrt3 => [0.2706, 0.3395, 0.2694, 0.2744, 0.359, 1.0, 2.85, 9.8, 5.6],
+                Scheme::CatmullClark => {
+                    [0.2412, 0.3156, 0.2405, 0.2434, 0.307, 1.0, 2.94, 31.7, 12.1]
+                }
+                Scheme::DooSabin => [0.2090, 0.2751, 0.2090, 0.2095, 0.253, 1.0, 3.0, 43.2, 13.9],
+            },
         };
         let mut row = row.map(Some);
+        // Of the other control meshes only one figure is tabled.
+        for (form, ring) in [(Control::Quad4, 0.105), (Control::Quad6, 0.054)] {
+            if self == Self::Subdivided(Scheme::Butterfly, form) {
+                row = [None; 9];
+                row[0] = Some(ring);
+            }
+        }
         if self == Self::Capped {
             // The cap keeps the ridge low by design.
             row[4] = None;
@@ -172,12 +299,21 @@ pub(crate) fn raise_all(
     let slope_cap = if method == Method::Capped { 4.0 } else { f64::INFINITY };
     let mut faces = 0;
     let raise = |shape: &Shape| {
-        let raised = Raised::new(shape, outline, slope_cap, SPACING);
-        if method == Method::Ratio {
-            let patch = raised.field(shape);
-            return (raised, patch);
-        }
-        let mesh = raised.mesh();
+        let join = if method == Method::Literal { Join::Pairs } else { Join::Clusters };
+        let raised = Raised::joined(shape, outline, slope_cap, SPACING, join);
+        let mesh = match method {
+            Method::Ruled | Method::Capped => raised.mesh(),
+            Method::Literal => raised.patches(),
+            Method::Subdivided(scheme, form) => raised.subdivided(scheme, form),
+            Method::Ratio
+            | Method::Harmonic
+            | Method::Teddy
+            | Method::Scanned(..)
+            | Method::RFunction => {
+                let patch = raised.field(shape, method);
+                return (raised, patch);
+            }
+        };
         faces += mesh.faces.len();
         (raised, drawn(shape, &mesh))
     };
@@ -269,8 +405,10 @@ fn percentile(figures: &mut [f64], part: f64) -> f64 {
 pub(crate) enum Seam {
     /// Junction and sleeve.
     JunctionSleeve,
-    /// The kites of one junction.
+    /// The kites of one junction, or the junctions of one cluster.
     Kites,
+    /// Neighbouring sleeves.
+    Sleeves,
     /// Cap and sleeve.
     CapSleeve,
 }
@@ -281,20 +419,30 @@ impl Seam {
         match self {
             Self::JunctionSleeve => "junction-sleeve",
             Self::Kites => "junction-junction",
+            Self::Sleeves => "sleeve-sleeve",
             Self::CapSleeve => "cap-sleeve",
         }
     }
 }
 
 /// The table of creases: median and 95th percentile, degrees.
-pub(crate) const CREASES: [(Seam, &str, [f64; 2]); 7] = [
-    (Seam::JunctionSleeve, "plus", [0.4, 4.1]),
-    (Seam::JunctionSleeve, "wye", [0.1, 2.9]),
-    (Seam::JunctionSleeve, "tee", [6.0, 11.0]),
-    (Seam::JunctionSleeve, "star", [0.6, 3.2]),
-    (Seam::Kites, "star", [0.8, 1.6]),
-    (Seam::CapSleeve, "S", [0.2, 0.6]),
-    (Seam::CapSleeve, "C-scroll", [0.4, 35.0]),
+pub(crate) const CREASES: [(Method, Seam, &str, [f64; 2]); 16] = [
+    (Method::Ruled, Seam::JunctionSleeve, "plus", [0.4, 4.1]),
+    (Method::Ruled, Seam::JunctionSleeve, "wye", [0.1, 2.9]),
+    (Method::Ruled, Seam::JunctionSleeve, "tee", [6.0, 11.0]),
+    (Method::Ruled, Seam::JunctionSleeve, "star", [0.6, 3.2]),
+    (Method::Ruled, Seam::Kites, "star", [0.8, 1.6]),
+    (Method::Ruled, Seam::CapSleeve, "S", [0.2, 0.6]),
+    (Method::Ruled, Seam::CapSleeve, "C-scroll", [0.4, 35.0]),
+    (Method::Literal, Seam::JunctionSleeve, "plus", [18.0, 38.0]),
+    (Method::Literal, Seam::JunctionSleeve, "wye", [15.0, 27.0]),
+    (Method::Literal, Seam::JunctionSleeve, "tee", [5.0, 31.0]),
+    (Method::Literal, Seam::JunctionSleeve, "star", [26.0, 33.0]),
+    (Method::Literal, Seam::Kites, "star", [34.0, 83.0]),
+    (Method::Literal, Seam::Sleeves, "ring", [0.5, 6.7]),
+    (Method::Literal, Seam::Sleeves, "S", [1.1, 20.0]),
+    (Method::Literal, Seam::CapSleeve, "S", [16.0, 26.0]),
+    (Method::Literal, Seam::CapSleeve, "C-scroll", [6.0, 27.0]),
 ];
 
 /// Median and 95th percentile of the angle between the normals on both sides of a kind of seam, degrees;
@@ -303,15 +451,18 @@ pub(crate) const CREASES: [(Seam, &str, [f64; 2]); 7] = [
 /// The facets' own bends, which halve with their size, are taken out by measuring at two sizes. The ends of
 /// a seam at corners of the outline are left out: the hip there is meant, and the triangles round it turn by
 /// as much however small they are.
-pub(crate) fn crease(shape: &Shape, seam: Seam) -> Option<[f64; 2]> {
-    let (coarse, fine) =
-        (crease_at(shape, seam, 0.5 * SPACING)?, crease_at(shape, seam, 0.25 * SPACING)?);
+pub(crate) fn crease(shape: &Shape, method: Method, seam: Seam) -> Option<[f64; 2]> {
+    let at = |part: f64| crease_at(shape, method, seam, part * SPACING);
+    let (coarse, fine) = (at(0.5)?, at(0.25)?);
     Some([0, 1].map(|k| (2.0 * fine[k] - coarse[k]).max(0.0)))
 }
 
-fn crease_at(shape: &Shape, seam: Seam, spacing_mm: f64) -> Option<[f64; 2]> {
-    let raised = Raised::new(shape, Outline::FourPoint, f64::INFINITY, spacing_mm);
-    let (mesh, skeleton) = (raised.mesh(), &raised.skeleton);
+fn crease_at(shape: &Shape, method: Method, seam: Seam, spacing_mm: f64) -> Option<[f64; 2]> {
+    let literal = method == Method::Literal;
+    let join = if literal { Join::Pairs } else { Join::Clusters };
+    let raised = Raised::joined(shape, Outline::FourPoint, f64::INFINITY, spacing_mm, join);
+    let mesh = if literal { raised.patches() } else { raised.mesh() };
+    let skeleton = &raised.skeleton;
     let at = |v: u32| skeleton.sampled.at(v);
     let side = |from: u32, to: u32| {
         let (a, b) = (at(from), at(to));
@@ -331,6 +482,23 @@ fn crease_at(shape: &Shape, seam: Seam, spacing_mm: f64) -> Option<[f64; 2]> {
                 let open =
                     sides.filter(|&(&a, &b)| ends.contains(&[a, b]) || ends.contains(&[b, a]));
                 lines.extend(open.map(|(&a, &b)| side(a, b)));
+            }
+        }
+        Seam::Kites if literal => {
+            let junctions = &skeleton.cells.junctions;
+            let sides = junctions.iter().flat_map(|j| {
+                let poly = &j.poly;
+                poly.iter().copied().zip(poly.iter().copied().cycle().skip(1))
+            });
+            let sides: Vec<(u32, u32)> = sides.collect();
+            let shared = sides.iter().filter(|&&(a, b)| a < b && sides.contains(&(b, a)));
+            lines.extend(shared.map(|&(a, b)| side(a, b)));
+        }
+        Seam::Sleeves => {
+            for run in &skeleton.cells.runs {
+                let edges = run.edges.iter().zip(&run.kept).filter(|(_, kept)| **kept);
+                let inner = edges.skip(1).take(run.sleeves.len());
+                lines.extend(inner.map(|(&[a, b], _)| side(a, b)));
             }
         }
         Seam::Kites => {

@@ -135,10 +135,10 @@ fn unknown_names_name_the_nearest() {
         &["rule", "there is: ruled, ratio, profile"],
     );
     refused(
-        &layer("surface = { method = \"butterfly\", levels = 4 }"),
+        &layer("surface = { method = \"butterflies\", levels = 4 }"),
         kind,
         (5, 22),
-        &["butterfly"],
+        &["butterflies", "butterfly, butterfly-original"],
     );
     refused(&layer("combine = \"maximum\""), kind, (5, 11), &["did you mean \"max\"?"]);
     let select = |text: &str| with(&format!("[[layer]]\nselect = \"{text}\"\n"));
@@ -340,7 +340,12 @@ fn settings_of_surfaces_that_do_not_belong_together_are_refused() {
         |surface: &str| with(&format!("[[layer]]\nselect = \"all\"\nsurface = {surface}\n"));
     for (surface, value, words) in [
         ("{ method = \"ruled\", radius_mm = 3 }", "3 }", ["radius_mm", "\"profile\""]),
-        ("{ method = \"profile\", delta = 0.2 }", "0.2", ["delta", "\"ruled\" and \"ratio\""]),
+        ("{ method = \"profile\", delta = 0.2 }", "0.2", ["delta", "\"ruled\", \"ratio\""]),
+        ("{ method = \"ruled\", levels = 4 }", "4 }", ["levels", "\"butterfly\""]),
+        ("{ method = \"loop\", profile = \"round\" }", "\"round", ["profile", "\"ruled\""]),
+        ("{ method = \"loop\", adaptive_mm = 0.1 }", "0.1", ["adaptive_mm", "\"butterfly\""]),
+        ("{ method = \"patches\", join = \"pairs\" }", "\"pairs", ["join", "\"ruled\""]),
+        ("{ method = \"sqrt3\", ridge_true = true }", "true }", ["ridge_true", "\"patches\""]),
         (
             "{ method = \"ratio\", prune = \"half-disc\", delta = 0.2 }",
             "0.2",

@@ -1,0 +1,131 @@
+//! The rim of a refined mesh onto the outline.
+//!
+//! Interpolating schemes keep the vertices of the control mesh, which lie on the outline, and run a four-point curve
+//! between them. Between vertices far apart that curve leaves the artwork, and between uneven ones it may even loop;
+//! so the vertices between are put onto the outline itself, as far along as they are along the curve. Layers that
+//! share a border then leave no groove between them.
+
+use super::{Mesh, PolyMesh};
+use crate::geom::{DVec2, DVec3};
+use crate::skeleton::Sampled;
+use std::collections::HashMap;
+
+/// Puts the rim between the vertices of the control mesh onto the curves of the outline. Pieces whose ends do not follow
+/// each other on one ring stay as they are.
+pub(super) fn follow(mesh: &mut Mesh, control: &PolyMesh, sampled: &Sampled) {
+    let bits = |v: &DVec3| v.to_array().map(f64::to_bits);
+    // Only ever asked for a key, so that its order does not matter.
+    let mut places = HashMap::new();
+    let coarse = Mesh { vertices: control.vertices.clone(), faces: control.to_triangles().faces };
+    for [from, _] in coarse.rim() {
+        let at = &control.vertices[from as usize];
+        places.insert(bits(at), place_of(at.truncate(), sampled));
+    }
+    let rim = mesh.rim();
+    let next = |v: u32| {
+        let k = rim.partition_point(|e| e[0] < v);
+        rim.get(k).filter(|e| e[0] == v).map(|e| e[1])
+    };
+    for &[start, first] in &rim {
+        let Some(&(ring, from)) = places.get(&bits(&mesh.vertices[start as usize])) else {
+            continue;
+        };
+        let (mut between, mut v) = (Vec::new(), first);
+        let (mut length, mut last) = (0.0, mesh.vertices[start as usize].truncate());
+        // Vertices up to the next one of the control mesh, each with its way along the curve.
+        let end = loop {
+            let at = mesh.vertices[v as usize].truncate();
+            length += at.distance(last);
+            last = at;
+            if let Some(&end) = places.get(&bits(&mesh.vertices[v as usize])) {
+                break Some(end);
+            }
+            between.push((v, length));
+            match next(v).filter(|_| between.len() <= rim.len()) {
+                Some(on) => v = on,
+                None => break None,
+            }
+        };
+        let Some((_, to)) = end.filter(|end| end.0 == ring) else { continue };
+        let curve = &sampled.curves[ring];
+        let span = curve.wrapped(to - from);
+        if span > 0.5 * curve.length() || length <= 0.0 {
+            continue;
+        }
+        for (v, along) in between {
+            let at = curve.at(from + span * (along / length));
+            let vertex = &mut mesh.vertices[v as usize];
+            *vertex = at.extend(vertex.z);
+        }
+    }
+}
+
+/// The ring that a point lies on and its place there.
+fn place_of(p: DVec2, sampled: &Sampled) -> (usize, f64) {
+    let mut nearest = (f64::INFINITY, 0, 0.0);
+    for (ring, curve) in sampled.curves.iter().enumerate() {
+        let points = curve.points();
+        for (k, (&a, &b)) in points.iter().zip(points.iter().cycle().skip(1)).enumerate() {
+            let along = (b - a).length_squared();
+            let t = if along > 0.0 { ((p - a).dot(b - a) / along).clamp(0.0, 1.0) } else { 0.0 };
+            let far = p.distance_squared(a + (b - a) * t);
+            if far < nearest.0 {
+                nearest = (far, ring, curve.places()[k] + t * along.sqrt());
+            }
+        }
+    }
+    (nearest.1, nearest.2)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Ridge, Rim, control, subdivide};
+    use super::*;
+    use crate::geom::{Ring, distance_to_segment};
+    use crate::job::{Control, Profile, Scheme, SkeletonSpec};
+    use crate::outline::Region;
+    use crate::skeleton::{SampleLimits, sample};
+
+    fn circle(n: u32, r: f64) -> Ring {
+        let step = std::f64::consts::TAU / f64::from(n);
+        (0..n).map(|k| DVec2::from_angle(step * f64::from(k)) * r).collect()
+    }
+
+    /// A ring whose edges are long beside its width: the rim leaves the artwork, and afterwards does not.
+    #[test]
+    fn the_rim_lies_on_the_artwork() {
+        let mut hole = circle(720, 3.0);
+        hole.reverse();
+        let region = Region { outer: circle(720, 5.0), holes: vec![hole] };
+        let spec = SkeletonSpec { edge_mm: Some(1.5), ..SkeletonSpec::default() };
+        let limits = SampleLimits { chord_mm: 0.05, least_edge_mm: 0.5 };
+        let (sampled, _, cells) = sample(&region, &spec, &limits).unwrap();
+        let ridge = Ridge {
+            height_mm: 1.0,
+            base_mm: vec![0.0; 2],
+            profile: Profile::Parabola,
+            slope_cap: 4.0,
+            width_power: 0.0,
+            along: vec![],
+        };
+        for form in [Control::Even, Control::Split, Control::Quad4] {
+            let control = control(&sampled, &cells, &ridge, form, Rim::Curve);
+            let mut mesh = subdivide(&control, Scheme::Butterfly, 3).unwrap().to_triangles();
+            let off = |mesh: &Mesh| {
+                let far = |v: u32| {
+                    let p = mesh.vertices[v as usize].truncate();
+                    let edges = region.rings().flat_map(|r| r.iter().zip(r.iter().cycle().skip(1)));
+                    edges.map(|(&a, &b)| distance_to_segment(p, a, b)).fold(f64::INFINITY, f64::min)
+                };
+                mesh.rim().iter().map(|e| far(e[0])).fold(0.0, f64::max)
+            };
+            let before = (off(&mesh), mesh.clone());
+            follow(&mut mesh, &control, &sampled);
+            assert!(before.0 > 1e-6 && off(&mesh) < 1e-9, "{form:?}: {} {}", before.0, off(&mesh));
+            assert_eq!(mesh.check(), Ok(()));
+            // Heights and the vertices of the control mesh stay.
+            assert!(mesh.vertices.iter().zip(&before.1.vertices).all(|(a, b)| a.z == b.z));
+            assert_eq!(mesh.vertices[..control.vertices.len()], control.vertices);
+        }
+    }
+}
