@@ -27,7 +27,7 @@ pub(super) struct LayerDraft {
 impl LayerDraft {
     /// Outlines traced from pixels keep waves of about a pixel: branches that small mean nothing.
     fn cut_small_branches(&mut self) {
-        if let SurfaceSpec::Ruled(crest) | SurfaceSpec::Ratio(crest) = &mut self.spec.surface {
+        if let Some(crest) = self.spec.surface.crest_mut() {
             crest.skeleton.significance =
                 Some(Significance { abs_mm: None, rel: rule::SIGNIFICANCE });
         }

@@ -64,6 +64,19 @@ impl SurfaceSpec {
         }
     }
 
+    /// The same, to be changed.
+    pub(super) fn crest_mut(&mut self) -> Option<&mut CrestSpec> {
+        match self {
+            Self::Profile { .. } | Self::RFunction { .. } | Self::ScanLines { .. } => None,
+            Self::Ruled(crest)
+            | Self::Ratio(crest)
+            | Self::Harmonic(crest)
+            | Self::Teddy(crest)
+            | Self::Patches { crest, .. } => Some(crest),
+            Self::Subdivision(subdivision) => Some(&mut subdivision.crest),
+        }
+    }
+
     /// Its method as job files name it.
     pub fn method(&self) -> &'static str {
         match self {

@@ -276,10 +276,8 @@ fn settings_of_a_picture_are_written_and_come_back() {
     };
     assert_eq!((job.artwork.trace, job.artwork.dpi), (want, Some(300.0)));
     // Small branches of traced outlines mean nothing, unless the job says so.
-    let significance = |layer: &LayerSpec| match &layer.surface {
-        SurfaceSpec::Ruled(crest) | SurfaceSpec::Ratio(crest) => crest.skeleton.significance,
-        SurfaceSpec::Profile { .. } => None,
-    };
+    let significance =
+        |layer: &LayerSpec| layer.surface.crest().and_then(|crest| crest.skeleton.significance);
     let some = Some(Significance { abs_mm: None, rel: 0.15 });
     assert_eq!(job.layers.iter().map(significance).collect::<Vec<_>>(), [some, None]);
     let mut again = load(&job.to_toml());
