@@ -96,7 +96,9 @@ fn gouges(field: &Heightfield, profile: &Profile, tip: DVec3, slack: f64) -> boo
         Profile::Turned(ref form) => {
             // Points on the triangles, an eighth of a side apart.
             let r = form.radius_mm();
-            triangles(field, tip.truncate(), r).iter().any(|&[a, b, c]| {
+            // What lies no higher than the tip is not in the cutter.
+            let over = |[a, b, c]: &[DVec3; 3]| a.z.max(b.z).max(c.z) > tip.z;
+            triangles(field, tip.truncate(), r).iter().filter(|t| over(t)).any(|&[a, b, c]| {
                 (0..=8).any(|i| {
                     (0..=8 - i).any(|j| {
                         let at = |k: i32| f64::from(k) / 8.0;
