@@ -1,4 +1,5 @@
-//! The built binary as a user meets it: what it writes, what it says, its exit codes.
+//! The built binary as a user meets it: what it writes, what it says, its exit codes. Long because each file of tests
+//! is a program of its own to build: one for all of the command's everyday use.
 #![allow(clippy::unwrap_used, reason = "a test: what cannot be read or run should stop it")]
 
 use std::collections::BTreeMap;

@@ -1,7 +1,8 @@
 //! Every key of every file that a user writes, in one table: name, type, range, default, meaning.
 //!
 //! The checks on reading, `relievo new` and `relievo defaults` are all made from it. Numbers that
-//! rules work with stand beside it in [`rule`].
+//! rules work with stand beside it in [`rule`]. The file is long because it is one table: split, no section could be
+//! compared with the next at a glance.
 
 /// One section of a file, as `[stock]` or `[[layer]]`.
 #[derive(Debug)]

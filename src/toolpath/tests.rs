@@ -1,4 +1,6 @@
 //! Laws of whole plans, held against brute force that shares no code with the planner.
+//!
+//! Long because every law uses the same brute force, which stands here with them.
 
 use super::fit::fit;
 use super::fixture::{Bump, bumps, contour, cutter, finish, job, raster, relief, rough};
