@@ -268,6 +268,8 @@ fn plan_from(
                 raster::raster(&site, stepover, angle_rad, block, &mut out)?;
             }
             OperationKind::Contour { scallop_mm, steeper_than_rad, milling } => {
+                raster::clear_deep_wood(&site, 0.0, block, &mut out)?;
+                let milling = Some(milling);
                 let cut = Contour { scallop_mm, steeper_than_rad, milling };
                 waterline::contour(&site, &cut, block, &mut out)?;
             }

@@ -170,6 +170,24 @@ impl Heightfield {
         &self.z[j * self.grid.nx..(j + 1) * self.grid.nx]
     }
 
+    /// The part of the field within `radius_mm` of a point along both axes, and at least a cell more; `None` where that
+    /// does not reach the field.
+    pub fn near(&self, p: DVec2, radius_mm: f64) -> Option<Self> {
+        let reach = DVec2::splat(radius_mm / self.grid.pitch_mm);
+        let (low, high) = (self.grid.to_grid(p) - reach, self.grid.to_grid(p) + reach);
+        let last = DVec2::new((self.grid.nx - 1) as f64, (self.grid.ny - 1) as f64);
+        if high.cmplt(DVec2::ZERO).any() || low.cmpgt(last).any() {
+            return None;
+        }
+        let first = (low.floor() - 1.0).clamp(DVec2::ZERO, last - 1.0);
+        let end = (high.ceil() + 1.0).min(last);
+        let (i0, j0) = (first.x as usize, first.y as usize);
+        let (nx, ny) = ((end.x - first.x) as usize + 1, (end.y - first.y) as usize + 1);
+        let grid = Grid { origin: self.grid.node(i0, j0), nx, ny, ..self.grid };
+        let rows = (j0..j0 + ny).flat_map(|j| &self.row(j)[i0..i0 + nx]);
+        Some(Self::from_z(grid, rows.copied().collect()))
+    }
+
     /// Lowest and highest height; `None` when a height is not a number or the field is empty.
     pub fn range(&self) -> Option<(f32, f32)> {
         let mut range = (f32::INFINITY, f32::NEG_INFINITY);
@@ -210,6 +228,37 @@ mod tests {
     fn the_grid_covers_the_rim() {
         for (w, p, n) in [(10.0, 0.1, 101), (10.05, 0.1, 102), (0.3, 0.1, 4), (1.0, 3.0, 2)] {
             assert_eq!(Grid::covering(DVec2::ZERO, w, w, p).unwrap().nx, n, "{w} at {p}");
+        }
+    }
+
+    proptest! {
+        /// A part has the field's own nodes, all those within the distance among them; there is none just where the
+        /// field is out of reach.
+        #[test]
+        fn the_part_near_a_point_has_the_nodes_of_the_field(
+            nx in 2usize..9, ny in 2usize..9, x in -3.0f64..6.0, y in -3.0f64..6.0, r in 0.0f64..3.0,
+        ) {
+            let grid = Grid { nx, ny, pitch_mm: 0.5, origin: DVec2::new(1.0, -1.0) };
+            let number = |i: usize, j: usize| (i + 100 * j) as f32;
+            let z = (0..nx * ny).map(|k| number(k % nx, k / nx)).collect();
+            let (field, p) = (Heightfield::from_z(grid, z), DVec2::new(x, y));
+            let bounds = grid.bounds();
+            let is_out = ((bounds.min - p).max(p - bounds.max)).max_element() > r;
+            let Some(part) = field.near(p, r) else {
+                prop_assert!(is_out);
+                return Ok(());
+            };
+            prop_assert!(!is_out && part.grid().nx >= 2 && part.grid().ny >= 2);
+            let mut found = 0;
+            for j in 0..part.grid().ny {
+                for i in 0..part.grid().nx {
+                    let at = grid.to_grid(part.grid().node(i, j)).round();
+                    prop_assert_eq!(part.at(i, j), number(at.x as usize, at.y as usize));
+                    found += usize::from((part.grid().node(i, j) - p).abs().max_element() <= r);
+                }
+            }
+            let near = |k: usize| (grid.node(k % nx, k / nx) - p).abs().max_element() <= r;
+            prop_assert_eq!(found, (0..nx * ny).filter(|&k| near(k)).count());
         }
     }
 

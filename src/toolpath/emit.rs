@@ -2,11 +2,12 @@
 
 use super::Site;
 use super::arcs::{Arc, Fitter};
+use super::order::{Direction, in_order};
 use super::ramp::ramp_onto;
 use super::trace::{DROP_MM, LEAST_ROUNDING_MM};
-use super::travel::{CARVED_MM, RAMP_GAP_MM, Travel};
+use super::travel::{CARVED_MM, Travel, ramp_gap_mm};
 use crate::cutter::Profile;
-use crate::geom::{DVec3, Move, MoveKind};
+use crate::geom::{DVec2, DVec3, Move, MoveKind};
 use crate::job::{Job, Machine, Operation, OperationKind};
 use crate::offset::Dropper;
 use crate::stock::{Block, Contact};
@@ -82,11 +83,28 @@ impl<'a> Emitter<'a> {
         (self.moves, self.arcs)
     }
 
+    /// Cuts chains in an order with little travel, and takes each out of `block` before it goes to the next.
+    pub(super) fn passes(
+        &mut self,
+        chains: Vec<Vec<DVec3>>,
+        direction: Direction,
+        profile: &Profile,
+        block: &mut Block,
+    ) {
+        for chain in in_order(chains, direction, self.at()) {
+            let first = self.moves.len();
+            let touch_mm = touch_mm(profile, block, chain[0].truncate());
+            self.chain(&chain, touch_mm, &Travel::new(self.job, self.operation, block));
+            self.cut(first, profile, block);
+        }
+    }
+
     /// Goes to the start of the chain, enters and cuts; the tool stays down. `wood_mm`: the height of the tip at which the
     /// cutter touches wood at the start; `travel`: over the wood as it is. A chain without room to ramp is only counted.
     pub(super) fn chain(&mut self, chain: &[DVec3], wood_mm: f64, travel: &Travel) {
         let safe_z_mm = self.job.safe_z_mm;
-        let ramp_z = (wood_mm + RAMP_GAP_MM).max(chain[0].z).min(safe_z_mm.max(chain[0].z));
+        let ramp_z = wood_mm + ramp_gap_mm(wood_mm);
+        let ramp_z = ramp_z.max(chain[0].z).min(safe_z_mm.max(chain[0].z));
         let Some(entry) = ramp_onto(chain, ramp_z, libm::tan(self.job.ramp_rad)) else {
             self.skipped += 1;
             return;
@@ -179,6 +197,12 @@ impl<'a> Emitter<'a> {
     }
 }
 
+/// Height of the tip at which a cutter that comes straight down over a point touches the wood, mm.
+fn touch_mm(profile: &Profile, block: &Block, p: DVec2) -> f64 {
+    let wood = block.field().near(p, profile.radius_mm());
+    wood.map_or(f64::NEG_INFINITY, |wood| Dropper::new(&wood, profile.clone()).drop(p))
+}
+
 /// The largest of a figure (by index) for each move and the moves within [`NEARBY_MM`] of way before and after it.
 fn most_nearby(moves: &[Move], figure: impl Fn(usize) -> f64) -> Vec<f64> {
     // Greatest of a sliding window over the way (its ends by where moves begin and end).
@@ -227,8 +251,12 @@ fn feed(way: DVec3, most_mm_per_min: f64, operation: &Operation, machine: &Machi
     if whole > 0.0 { whole } else { most }
 }
 
-/// Time to feed along points, s; the limits on steep pieces left out.
-pub(super) fn feed_seconds(operation: &Operation, points: &[DVec3]) -> f64 {
-    let length: f64 = points.windows(2).map(|e| e[0].distance(e[1])).sum();
-    60.0 * length / operation.feed_mm_per_min
+/// Time to feed along points, s; accelerations left out.
+pub(super) fn feed_seconds(site: &Site, points: &[DVec3]) -> f64 {
+    let (operation, machine) = (site.operation, &site.job.machine);
+    let minutes = |e: &[DVec3]| {
+        let way = e[1] - e[0];
+        way.length() / feed(way, operation.feed_mm_per_min, operation, machine)
+    };
+    60.0 * points.windows(2).map(minutes).sum::<f64>()
 }

@@ -1,20 +1,22 @@
-//! Finishing to a scallop height whatever the slope: passes over everything, then passes across wherever those
-//! left more.
+//! Finishing to a scallop height whatever the slope: waterlines on steep ground, passes over the rest, then more wherever
+//! those left too much.
 //!
 //! Passes a distance s apart in plan lie `s / sqrt(1 - (N n)^2)` apart on the surface, N its normal and n the
-//! horizontal direction across the passes: cusps grow on slopes that fall across them, and a hollow along a pass
-//! may be missed by half a stepover. For two directions at right angles the smaller (N n)^2 is 1/2 at most, so
-//! passes of `s / sqrt 2` in the better direction hold the scallop on every slope, walls included. Which places
-//! want them is not guessed from slopes but measured on the wood that the passes before have left.
+//! horizontal direction across the passes: cusps grow by `1 / cos^2` of a slope that falls across them. So ground on
+//! which they could grow beyond the limit is cut along its contours first, where the cutter neither climbs nor has to go
+//! down at its plunge limit. A hollow along a pass may be missed by half a stepover. For two directions at right angles
+//! the smaller (N n)^2 is 1/2 at most, so passes of `s / sqrt 2` in the better direction hold the scallop on every slope,
+//! walls included. Which places want them is not guessed from slopes but measured on the wood that the passes before
+//! have left.
 
 use super::emit::Emitter;
 use super::left::Surfaces;
 use super::raster::{First, Passes, clear_deep_wood, passes, passes_where_wood_is_left};
 use super::trace::LEAST_ROUNDING_MM;
-use super::waterline::{Waterlines, waterlines};
+use super::waterline::{Contour, Waterlines, contour, waterlines};
 use super::{Site, ToolpathError};
 use crate::cutter::Profile;
-use crate::geom::{DVec2, Heightfield};
+use crate::geom::Heightfield;
 use crate::offset::{closing, tip_field};
 use crate::stock::Block;
 use std::f64::consts::{FRAC_1_SQRT_2, FRAC_PI_2, FRAC_PI_4};
@@ -29,6 +31,8 @@ const TURNS: [(f64, f64); 6] = [
     (0.0, 0.25),
     (FRAC_PI_2, 0.125),
 ];
+/// Ground steeper than this is finished along its contours first in any case.
+const STEEP_RAD: f64 = FRAC_PI_4;
 /// Part of `gouge_mm` that may be left above the scallop height before more passes are worth it.
 const SPARE: f64 = 0.75;
 
@@ -53,12 +57,19 @@ pub(super) fn finish(
     let stepover_mm = site.stepover_of(scallop_mm)?;
     clear_deep_wood(site, angle_rad, block, out)?;
     let limit_mm = scallop_mm + SPARE * site.job.tolerance.gouge_mm;
+    let mut site = *site;
+    if !site.finished {
+        // Where parallel passes could leave more than the limit: cusps grow by 1 / cos^2 of a slope across them.
+        let steeper_than_rad = libm::acos((scallop_mm / limit_mm).sqrt()).min(STEEP_RAD);
+        let cut = Contour { scallop_mm, steeper_than_rad, milling: None };
+        contour(&site, &cut, block, out)?;
+        site.finished = true;
+    }
+    let site = &site;
     let first = First { stepover_mm, angle_rad, outlines };
-    let Some(done) = passes_where_wood_is_left(site, &first, limit_mm, block, out)? else {
-        return Ok(());
-    };
-    out.note_deep_pass(done.deepest_mm);
-    out.cut(done.first, &profile, block);
+    let deepest_mm = passes_where_wood_is_left(site, &first, limit_mm, block, out)?;
+    let Some(deepest_mm) = deepest_mm else { return Ok(()) };
+    out.note_deep_pass(deepest_mm);
     let rolled = profile.rolled(LEAST_ROUNDING_MM);
     let tip = tip_field(site.target, &rolled);
     let reach = closing(&tip, &rolled);
@@ -74,11 +85,9 @@ pub(super) fn finish(
     for (turn, closer) in TURNS {
         let surfaces = Surfaces { tip: &tip, reach: &reach, wood: block.field() };
         let Some(left) = surfaces.left(limit_mm, &profile, stepover_mm) else { break };
-        let only = |p: DVec2| left.cap_mm(p);
         let (stepover_mm, angle_rad) = (closer * stepover_mm, angle_rad + turn);
-        let across = Passes { stepover_mm, angle_rad, only: Some(&only) };
-        let done = passes(site, &across, block, out)?;
-        out.cut(done.first, &profile, block);
+        let across = Passes { stepover_mm, angle_rad, only: Some(&left) };
+        passes(site, &across, block, out)?;
     }
     Ok(())
 }

@@ -14,9 +14,10 @@ use super::chain::Span;
 use super::contours::{Cells, Edge, chords, runs_with};
 use super::emit::Emitter;
 use super::fit::fit;
-use super::order::{Direction, in_order};
+use super::left::Left;
+use super::order::Direction;
 use super::pocket::{begun_at, is_closed, nearest_vertex};
-use super::raster::{Passed, TOP_MM, deepest_pass_mm, link, points};
+use super::raster::{TOP_MM, deepest_pass_mm, link, points};
 use super::rows::{Row, rim};
 use super::trace::{LEAST_ROUNDING_MM, Sample, Tracer};
 use super::travel::Travel;
@@ -36,8 +37,8 @@ pub(super) struct Inward<'a> {
     pub(super) distance: &'a Heightfield,
     /// Distance of the passes, mm.
     pub(super) stepover_mm: f64,
-    /// Where to work, by the height up to which the tip may go there (-inf: not at all); `None` = everywhere.
-    pub(super) only: Option<&'a (dyn Fn(DVec2) -> f64 + Sync)>,
+    /// Where to work; `None` = everywhere.
+    pub(super) only: Option<&'a Left>,
 }
 
 /// A pass and the box around it.
@@ -46,15 +47,15 @@ struct Pass {
     bounds: Bounds,
 }
 
-/// Plans one set of passes on the wood as it is; the moves go to `out`, the wood is left to the caller.
+/// Plans one set of passes on the wood as it is and takes them out of `block`; the moves go to `out`. Returns the deepest
+/// wood that they cut at once, where that is deeper than one pass should, mm; else 0.
 pub(super) fn inward(
     site: &Site,
     cut: &Inward,
-    block: &Block,
+    block: &mut Block,
     out: &mut Emitter,
-) -> Result<Passed, ToolpathError> {
+) -> Result<f64, ToolpathError> {
     let profile = Profile::of(&site.operation.cutter);
-    let wood = Dropper::new(block.field(), profile.clone());
     let rolled = profile.rolled(LEAST_ROUNDING_MM);
     let dropper = Dropper::new(site.target, rolled.clone());
     let (pitch_mm, fit_mm) = (site.target.grid().pitch_mm, site.job.tolerance.fit_mm);
@@ -78,12 +79,8 @@ pub(super) fn inward(
             chains.push(span);
         }
     }
-    let first = out.moves().len();
-    for chain in in_order(chains, Direction::Both, out.at()) {
-        let touch_mm = wood.drop(chain[0].truncate());
-        out.chain(&chain, touch_mm, &travel);
-    }
-    Ok(Passed { first, deepest_mm })
+    out.passes(chains, Direction::Both, &profile, block);
+    Ok(deepest_mm)
 }
 
 impl Inward<'_> {
@@ -119,7 +116,7 @@ impl Inward<'_> {
     ) -> Vec<Span> {
         let runs = match self.only {
             None => vec![curve.to_vec()],
-            Some(only) => runs_with(curve, |p| only(p) > f64::NEG_INFINITY),
+            Some(only) => runs_with(curve, |p| only.cap_mm(p) > f64::NEG_INFINITY),
         };
         let plans = runs.iter().flat_map(|run| chords(run, PLAN_FIT * self.stepover_mm, |_| true));
         plans.flat_map(|plan| self.on_target(site, &plan, tracer)).collect()
@@ -137,7 +134,8 @@ impl Inward<'_> {
         for way in plan.windows(2) {
             let row = Row { from: way[0], to: way[1] };
             let along = (row.to - row.from).normalize_or_zero();
-            let cap = |p: &Sample| self.only.map_or(TOP_MM, |only| only(row.from + along * p.s));
+            let cap =
+                |p: &Sample| self.only.map_or(TOP_MM, |only| only.cap_mm(row.from + along * p.s));
             let wanted = |p: &Sample| p.z <= cap(p).min(TOP_MM);
             let path = tracer.trace(row.from, row.to);
             let mut k = 0;

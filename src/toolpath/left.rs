@@ -7,8 +7,8 @@ use crate::geom::{DVec2, DVec3, Grid, Heightfield};
 use crate::offset::{closing, tip_field};
 use rayon::prelude::*;
 
-/// Work is asked for this far beyond what is left, mm: room to ramp.
-const ROOM_MM: f64 = 0.3;
+/// Half the diagonal of a cell, in its sides, and a little.
+const HALF_DIAGONAL: f64 = 0.71;
 /// The tip may climb this many stepovers above the work: up to walls, not over them.
 const CLIMB: f64 = 2.0;
 
@@ -58,10 +58,11 @@ impl Surfaces<'_> {
     /// is none.
     pub(super) fn left(&self, limit_mm: f64, profile: &Profile, stepover_mm: f64) -> Option<Left> {
         let grid = *self.reach.grid();
+        let cutter = Disc::new(profile, grid.pitch_mm);
         let found: Vec<Vec<usize>> = (0..grid.ny)
             .into_par_iter()
             .map(|j| {
-                let axis = |i| self.axis_for(i, j, limit_mm, profile);
+                let axis = |i| self.axis_for(i, j, limit_mm, &cutter);
                 (0..grid.nx).filter_map(axis).collect()
             })
             .collect();
@@ -72,8 +73,9 @@ impl Surfaces<'_> {
         for k in found.into_iter().flatten() {
             cap_mm[k] = self.tip.z()[k] + (CLIMB * stepover_mm) as f32;
         }
-        let by = ((stepover_mm + ROOM_MM) / grid.pitch_mm).ceil() as usize + 1;
-        Some(Left { grid, cap_mm: grown(&cap_mm, grid.nx, by) })
+        // A place is as good as the node there, at most half a diagonal away.
+        let near = 0.5 * stepover_mm / grid.pitch_mm + HALF_DIAGONAL;
+        Some(Left { grid, cap_mm: grown(&cap_mm, grid.nx, near) })
     }
 
     /// True when the surface that can be reached comes within `limit_mm` of a point above node (i, j).
@@ -98,7 +100,7 @@ impl Surfaces<'_> {
 
     /// The node that the axis must pass by to take the wood at node (i, j) down to what can be reached; `None` when
     /// there is no more than `limit_mm`.
-    fn axis_for(&self, i: usize, j: usize, limit_mm: f64, profile: &Profile) -> Option<usize> {
+    fn axis_for(&self, i: usize, j: usize, limit_mm: f64, cutter: &Disc) -> Option<usize> {
         let grid = self.reach.grid();
         let here = f64::from(self.reach.at(i, j));
         let gap = f64::from(self.wood.at(i, j)) - here;
@@ -109,60 +111,97 @@ impl Surfaces<'_> {
         if self.is_within(above, i, j, limit_mm) {
             return None;
         }
-        // The cutter that comes lowest over this node.
-        let radius_mm = profile.radius_mm();
-        let reach = (radius_mm / grid.pitch_mm) as usize + 1;
-        let span = |k: usize, n: usize| k.saturating_sub(reach)..(k + reach + 1).min(n);
-        let node = grid.node(i, j);
-        let nodes = span(j, grid.ny).flat_map(|j| span(i, grid.nx).map(move |i| (i, j)));
-        let above = nodes.filter_map(|(i, j)| {
-            let height = profile.height_at(grid.node(i, j).distance(node))?;
-            Some((f64::from(self.tip.at(i, j)) + height, j * grid.nx + i))
-        });
-        above.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, k)| k)
+        cutter.lowest_over(self.tip, i, j)
+    }
+}
+
+/// The underside of a cutter over the nodes of a grid.
+struct Disc {
+    /// Columns and rows from the axis to the rim.
+    reach: usize,
+    /// Height above the tip, row by row, mm; infinite beyond the rim.
+    heights_mm: Vec<f32>,
+}
+
+impl Disc {
+    fn new(profile: &Profile, pitch_mm: f64) -> Self {
+        let reach = (profile.radius_mm() / pitch_mm) as usize + 1;
+        let side = 2 * reach + 1;
+        let height = |k: usize| {
+            let away = |n: usize| n.abs_diff(reach) as f64 * pitch_mm;
+            let r_mm = libm::hypot(away(k % side), away(k / side));
+            profile.height_at(r_mm).map_or(f32::INFINITY, |h| h as f32)
+        };
+        Self { reach, heights_mm: (0..side * side).map(height).collect() }
+    }
+
+    /// The node where the axis stands when the cutter comes lowest over node (i, j).
+    fn lowest_over(&self, tip: &Heightfield, i: usize, j: usize) -> Option<usize> {
+        let (grid, side) = (tip.grid(), 2 * self.reach + 1);
+        let columns = i.saturating_sub(self.reach)..(i + self.reach + 1).min(grid.nx);
+        let rows = j.saturating_sub(self.reach)..(j + self.reach + 1).min(grid.ny);
+        let mut best = (f32::INFINITY, None);
+        for row in rows {
+            let first = (row + self.reach - j) * side + columns.start + self.reach - i;
+            let heights = &self.heights_mm[first..first + columns.len()];
+            let tips = &tip.row(row)[columns.clone()];
+            let low = lowest_sum(tips, heights);
+            if low < best.0 {
+                let at = tips.iter().zip(heights).position(|(tip, height)| tip + height == low);
+                best = (low, at.map(|at| row * grid.nx + columns.start + at));
+            }
+        }
+        best.1
     }
 }
 
 impl Left {
-    #[cfg(test)]
-    pub(super) fn everywhere(grid: Grid) -> Self {
-        Self { grid, cap_mm: vec![f32::INFINITY; grid.len()] }
-    }
-
-    /// True where the tip may go at all.
+    /// True where the tip may pass.
     pub(super) fn is_wanted(&self, node: usize) -> bool {
         self.cap_mm[node] > f32::NEG_INFINITY
     }
 
     /// How high the tip may go at a point, mm.
     pub(super) fn cap_mm(&self, p: DVec2) -> f64 {
+        self.node(p).map_or(f64::NEG_INFINITY, |k| f64::from(self.cap_mm[k]))
+    }
+
+    fn node(&self, p: DVec2) -> Option<usize> {
         let at = self.grid.to_grid(p).round().max(DVec2::ZERO);
         let (i, j) = (at.x as usize, at.y as usize);
-        if i < self.grid.nx && j < self.grid.ny {
-            f64::from(self.cap_mm[j * self.grid.nx + i])
-        } else {
-            f64::NEG_INFINITY
-        }
+        (i < self.grid.nx && j < self.grid.ny).then_some(j * self.grid.nx + i)
     }
 }
 
-/// The highest value within `by` columns and rows.
-fn grown(values: &[f32], nx: usize, by: usize) -> Vec<f32> {
-    let ny = values.len() / nx;
-    let raise = |out: &mut f32, v: f32| *out = out.max(v);
-    let mut wide = vec![f32::NEG_INFINITY; values.len()];
-    wide.par_chunks_mut(nx).zip(values.par_chunks(nx)).for_each(|(wide, row)| {
-        for i in (0..nx).filter(|&i| row[i] > f32::NEG_INFINITY) {
-            wide[i.saturating_sub(by)..(i + by + 1).min(nx)]
-                .iter_mut()
-                .for_each(|w| raise(w, row[i]));
+/// The lowest sum of two values at the same place.
+fn lowest_sum(a: &[f32], b: &[f32]) -> f32 {
+    const LANES: usize = 8;
+    let lower = |x: f32, y: f32| if y < x { y } else { x };
+    let mut lanes = [f32::INFINITY; LANES];
+    for (a, b) in a.chunks_exact(LANES).zip(b.chunks_exact(LANES)) {
+        for k in 0..LANES {
+            lanes[k] = lower(lanes[k], a[k] + b[k]);
         }
-    });
+    }
+    let rest = a.len() / LANES * LANES;
+    let rest = a[rest..].iter().zip(&b[rest..]).map(|(a, b)| a + b);
+    lanes.into_iter().chain(rest).fold(f32::INFINITY, lower)
+}
+
+/// The highest value within a distance of `radius` nodes.
+fn grown(values: &[f32], nx: usize, radius: f64) -> Vec<f32> {
+    let (ny, by) = (values.len() / nx, radius as usize);
     let mut high = vec![f32::NEG_INFINITY; values.len()];
     high.par_chunks_mut(nx).enumerate().for_each(|(j, high)| {
         for row in j.saturating_sub(by)..(j + by + 1).min(ny) {
-            let row = &wide[row * nx..(row + 1) * nx];
-            high.iter_mut().zip(row).for_each(|(high, &wide)| raise(high, wide));
+            let across = row.abs_diff(j) as f64;
+            let wide = (radius * radius - across * across).sqrt() as usize;
+            let values = &values[row * nx..(row + 1) * nx];
+            for i in (0..nx).filter(|&i| values[i] > f32::NEG_INFINITY) {
+                for high in &mut high[i.saturating_sub(wide)..(i + wide + 1).min(nx)] {
+                    *high = high.max(values[i]);
+                }
+            }
         }
     });
     high
@@ -212,6 +251,42 @@ mod tests {
             }
             let got = distance_to_facet(p, facet);
             prop_assert!(got <= nearest + 1e-9 && got >= nearest - 0.06, "{got} {nearest}");
+        }
+    }
+
+    proptest! {
+        /// The lowest cutter over a node is that of all nodes, looked at one by one.
+        #[test]
+        fn the_lowest_cutter_over_a_node_is_found(
+            z in prop::collection::vec(-3.0f32..0.0, 24 * 20), i in 0usize..24, j in 0usize..20, r in 0.2f64..2.5,
+        ) {
+            let grid = Grid { nx: 24, ny: 20, pitch_mm: 0.2, origin: DVec2::ZERO };
+            let tip = Heightfield::from_z(grid, z);
+            let profile = Profile::Ball { radius_mm: r };
+            let over = |k: usize| {
+                let away = grid.node(k % 24, k / 24).distance(grid.node(i, j));
+                profile.height_at(away).map_or(f64::INFINITY, |h| f64::from(tip.z()[k]) + h)
+            };
+            let lowest = (0..grid.len()).map(over).fold(f64::INFINITY, f64::min);
+            let found = Disc::new(&profile, grid.pitch_mm).lowest_over(&tip, i, j).unwrap();
+            prop_assert!((over(found) - lowest).abs() < 1e-6, "{} {lowest}", over(found));
+        }
+
+        /// Grown values are the highest within the radius.
+        #[test]
+        fn grown_values_are_the_highest_around(
+            wanted in prop::collection::vec(prop::option::weighted(0.1, -3.0f32..0.0), 15 * 12), radius in 0.0f64..4.0,
+        ) {
+            let values: Vec<f32> = wanted.iter().map(|v| v.unwrap_or(f32::NEG_INFINITY)).collect();
+            let high = grown(&values, 15, radius);
+            for (k, &got) in high.iter().enumerate() {
+                let near = |n: &usize| {
+                    let (x, y) = ((n % 15).abs_diff(k % 15), (n / 15).abs_diff(k / 15));
+                    (x * x + y * y) as f64 <= radius * radius
+                };
+                let all = (0..values.len()).filter(near).map(|n| values[n]);
+                prop_assert_eq!(got, all.fold(f32::NEG_INFINITY, f32::max));
+            }
         }
     }
 

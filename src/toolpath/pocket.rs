@@ -13,7 +13,7 @@ use super::chain::Span;
 use super::contours::{Cells, Edge, checked, chords, reached, runs_with};
 use super::emit::{Emitter, feed_seconds};
 use super::levels::levels;
-use super::order::{Direction, in_order};
+use super::order::Direction;
 use super::rows::rim;
 use super::trace::{DROP_MM, LEAST_ROUNDING_MM};
 use super::travel::Travel;
@@ -116,14 +116,8 @@ pub(super) fn pockets(
             wanted: &wanted,
             is_pointed,
         };
-        let before = out.moves().len();
-        let travel = Travel::new(site.job, site.operation, block);
-        let chains = level.chains(site, &travel);
-        for chain in in_order(chains, Direction::Fixed, out.at()) {
-            let wood_mm = block.highest_under(profile.radius_mm(), chain[0].truncate());
-            out.chain(&chain, wood_mm, &travel);
-        }
-        out.cut(before, &profile, block);
+        let chains = level.chains(site, &Travel::new(site.job, site.operation, block));
+        out.passes(chains, Direction::Fixed, &profile, block);
     }
     Ok(())
 }
@@ -185,7 +179,7 @@ impl Level<'_> {
     fn links(&self, site: &Site, travel: &Travel, chain: &[DVec3], span: &[DVec3]) -> bool {
         let (a, b) = (chain[chain.len() - 1], span[0]);
         let near = a.distance(b) <= LINK_STEPOVERS * self.cut.stepover_mm
-            || feed_seconds(site.operation, &[a, b]) <= travel.lift_seconds(a, b);
+            || feed_seconds(site, &[a, b]) <= travel.lift_seconds(a, b);
         near && checked(a.truncate(), b.truncate(), |p| self.is_free(p))
     }
 

@@ -10,8 +10,8 @@ use super::chain::{Span, chains};
 use super::emit::{Emitter, feed_seconds};
 use super::fit::fit;
 use super::inward::{Inward, inward};
-use super::left::{Todo, todo};
-use super::order::{Direction, in_order};
+use super::left::{Left, Todo, todo};
+use super::order::Direction;
 use super::rough::{Rough, rough};
 use super::rows::{Row, rim, rows, slanted_rim};
 use super::trace::{LEAST_ROUNDING_MM, Sample, Tracer};
@@ -65,7 +65,6 @@ pub(super) fn raster(
     block: &mut Block,
     out: &mut Emitter,
 ) -> Result<(), ToolpathError> {
-    let profile = Profile::of(&site.operation.cutter);
     let stepover_mm = match stepover {
         Stepover::Plan(s) => s,
         Stepover::Scallop(h) => site.stepover_of(h)?,
@@ -73,11 +72,8 @@ pub(super) fn raster(
     clear_deep_wood(site, angle_rad, block, out)?;
     let limit_mm = site.job.tolerance.scallop_mm + site.job.tolerance.gouge_mm;
     let first = First { stepover_mm, angle_rad, outlines: None };
-    let done = passes_where_wood_is_left(site, &first, limit_mm, block, out)?;
-    if let Some(done) = done {
-        out.note_deep_pass(done.deepest_mm);
-        out.cut(done.first, &profile, block);
-    }
+    let deepest_mm = passes_where_wood_is_left(site, &first, limit_mm, block, out)?;
+    out.note_deep_pass(deepest_mm.unwrap_or(0.0));
     Ok(())
 }
 
@@ -92,24 +88,20 @@ pub(super) struct First<'a> {
 }
 
 /// Passes over everything or, after earlier finishing, where that has left more than `limit_mm` within reach; `None` when
-/// it has left nothing.
+/// it has left nothing, else as [`passes`].
 pub(super) fn passes_where_wood_is_left(
     site: &Site,
     cut: &First,
     limit_mm: f64,
-    block: &Block,
+    block: &mut Block,
     out: &mut Emitter,
-) -> Result<Option<Passed>, ToolpathError> {
+) -> Result<Option<f64>, ToolpathError> {
     let First { stepover_mm, angle_rad, outlines } = *cut;
     let todo = todo(site, limit_mm, stepover_mm, block.field());
-    let cap = |p: DVec2| match &todo {
-        Todo::Here(left) => left.cap_mm(p),
-        _ => f64::INFINITY,
-    };
-    let only: Option<&(dyn Fn(DVec2) -> f64 + Sync)> = match &todo {
+    let only = match &todo {
         Todo::Nothing => return Ok(None),
         Todo::All => None,
-        Todo::Here(_) => Some(&cap),
+        Todo::Here(left) => Some(left),
     };
     match outlines {
         Some(distance) => inward(site, &Inward { distance, stepover_mm, only }, block, out),
@@ -124,27 +116,19 @@ pub(super) struct Passes<'a> {
     pub(super) stepover_mm: f64,
     /// Their direction from the x axis, radians.
     pub(super) angle_rad: f64,
-    /// Where to work, by the height up to which the tip may go there (-inf: not at all); `None` = everywhere.
-    pub(super) only: Option<&'a (dyn Fn(DVec2) -> f64 + Sync)>,
+    /// Where to work; `None` = everywhere.
+    pub(super) only: Option<&'a Left>,
 }
 
-/// What passes added.
-pub(super) struct Passed {
-    /// Index of the first of their moves.
-    pub(super) first: usize,
-    /// The deepest wood they cut at once, where that is deeper than one pass should, mm; else 0.
-    pub(super) deepest_mm: f64,
-}
-
-/// Plans one set of passes on the wood as it is; the moves go to `out`, the wood is left to the caller.
+/// Plans one set of passes on the wood as it is and takes them out of `block`; the moves go to `out`. Returns the deepest
+/// wood that they cut at once, where that is deeper than one pass should, mm; else 0.
 pub(super) fn passes(
     site: &Site,
     cut: &Passes,
-    block: &Block,
+    block: &mut Block,
     out: &mut Emitter,
-) -> Result<Passed, ToolpathError> {
+) -> Result<f64, ToolpathError> {
     let profile = Profile::of(&site.operation.cutter);
-    let wood = Dropper::new(block.field(), profile.clone());
     let rolled = profile.rolled(LEAST_ROUNDING_MM);
     let dropper = Dropper::new(site.target, rolled.clone());
     let fit_mm = site.job.tolerance.fit_mm;
@@ -164,14 +148,9 @@ pub(super) fn passes(
         rows.into_par_iter().map(|row| row_spans(site, &travel, cut, &row, &tracer)).collect();
     let deepest_mm = deepest_pass_mm(&spans, block, site.operation.cutter.working_mm());
     let link = |done: &[DVec3], next: &[DVec3]| link(site, &travel, &tracer, done, next);
-    let first = out.moves().len();
     let chains = chains(spans, Direction::Both, link);
-    for chain in in_order(chains, Direction::Both, out.at()) {
-        // Where the cutter would touch the wood: a high wall beside it does not count.
-        let touch_mm = wood.drop(chain[0].truncate());
-        out.chain(&chain, touch_mm, &travel);
-    }
-    Ok(Passed { first, deepest_mm })
+    out.passes(chains, Direction::Both, &profile, block);
+    Ok(deepest_mm)
 }
 
 /// A way over the target from the end of the path `done` to the start of `next` with the tool down, ends left out;
@@ -184,7 +163,7 @@ pub(super) fn link(
     next: &[DVec3],
 ) -> Option<Vec<DVec3>> {
     let (a, b) = (done[done.len() - 1], next[0]);
-    let seconds = |way: &[DVec3]| feed_seconds(site.operation, way);
+    let seconds = |way: &[DVec3]| feed_seconds(site, way);
     let (straight, lift) = (seconds(&[a, b]), travel.lift_seconds(a, b));
     if straight > lift {
         return None;
@@ -226,9 +205,10 @@ fn row_spans(
     let pitch = site.target.grid().pitch_mm;
     let n = (length / pitch).ceil().max(1.0) as usize;
     let at = |s: f64| row.from + (row.to - row.from) * (s / length);
+    let cap_mm = |s: f64| only.cap_mm(at(s));
     let mut stretches: Vec<(f64, f64)> = Vec::new();
     for s in (0..=n).map(|k| length * (k as f64 / n as f64)) {
-        if only(at(s)) == f64::NEG_INFINITY {
+        if cap_mm(s) == f64::NEG_INFINITY {
             continue;
         }
         match stretches.last_mut() {
@@ -241,7 +221,7 @@ fn row_spans(
         let part = Row { from: at(from), to: at(to) };
         let path = tracer.trace(part.from, part.to);
         // Up to walls, not over them.
-        let wanted = |p: &Sample| p.z <= TOP_MM && p.z <= only(at(from + p.s));
+        let wanted = |p: &Sample| p.z <= TOP_MM && p.z <= cap_mm(from + p.s);
         for run in path.chunk_by(|a, b| wanted(a) == wanted(b)) {
             if run.len() > 1 && wanted(&run[0]) {
                 spans.push(points(&part, &fit(run, site.job.tolerance.fit_mm)));
@@ -350,7 +330,7 @@ fn spans(site: &Site, travel: &Travel, row: &Row, mut path: Vec<Sample>) -> Vec<
 /// True when going on along the row from `a` to `b` is quicker than lifting.
 fn crosses(site: &Site, travel: &Travel, row: &Row, a: &Sample, b: &Sample) -> bool {
     let ends = points(row, &[*a, *b]);
-    feed_seconds(site.operation, &ends) <= travel.lift_seconds(ends[0], ends[1])
+    feed_seconds(site, &ends) <= travel.lift_seconds(ends[0], ends[1])
 }
 
 /// Samples of a row as points in space.

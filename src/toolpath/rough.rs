@@ -2,7 +2,7 @@
 
 use super::chain::{Span, chains};
 use super::emit::{Emitter, feed_seconds};
-use super::order::{Direction, in_order};
+use super::order::Direction;
 use super::rows::{Row, rows};
 use super::trace::{DROP_MM, LEAST_ROUNDING_MM, Sample, Tracer};
 use super::travel::Travel;
@@ -115,19 +115,14 @@ pub(super) fn rough(
         let link = |done: &[DVec3], next: &[DVec3]| {
             let (a, b) = (done[done.len() - 1], next[0]);
             let direct = [a, b];
-            if feed_seconds(site.operation, &direct) > travel.lift_seconds(a, b) {
+            if feed_seconds(site, &direct) > travel.lift_seconds(a, b) {
                 return None;
             }
             let way = tracer.even(a.truncate(), b.truncate());
             way.iter().all(|p| is_allowed(p, z)).then(Vec::new)
         };
-        let before = out.moves().len();
         let chains = chains(by_row, Direction::Both, link);
-        for chain in in_order(chains, Direction::Both, out.at()) {
-            let wood = block.highest_under(profile.radius_mm(), chain[0].truncate());
-            out.chain(&chain, wood, &travel);
-        }
-        out.cut(before, &profile, block);
+        out.passes(chains, Direction::Both, &profile, block);
     }
     Ok(())
 }

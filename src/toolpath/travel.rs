@@ -11,14 +11,21 @@ use crate::geom::{DVec2, DVec3};
 use crate::job::{Job, Operation};
 use crate::stock::Block;
 
-/// Gap above the wood where a ramp begins; down to it the cutter feeds straight through air, mm.
-pub(super) const RAMP_GAP_MM: f64 = 0.2;
+/// Gap above the stock's top where a ramp begins; down to it the cutter feeds straight through air, mm.
+const TOP_GAP_MM: f64 = 0.2;
+/// The same above wood that has been carved: its height is known.
+const GAP_MM: f64 = 0.05;
 /// Ground counts as carved where the wood stands at least this far below the stock's top, mm.
 pub(super) const CARVED_MM: f64 = 0.02;
 /// Room beside the cutter on its way, mm.
 const BESIDE_MM: f64 = 0.5;
 /// A travel that saves less than this against safe Z goes at safe Z, mm.
 const WORTH_MM: f64 = 0.5;
+
+/// Gap above wood of this height where a ramp begins, mm.
+pub(super) fn ramp_gap_mm(wood_mm: f64) -> f64 {
+    if wood_mm < -CARVED_MM { GAP_MM } else { TOP_GAP_MM }
+}
 
 /// Travel over the wood as it is.
 #[derive(Debug, Clone, Copy)]
@@ -47,15 +54,24 @@ impl<'a> Travel<'a> {
         if wood_mm > -CARVED_MM || low_mm > safe_z_mm - WORTH_MM { safe_z_mm } else { low_mm }
     }
 
-    /// Time to lift at `a`, travel and come down to `b` and ramp in again, s; accelerations left out.
+    /// Time to lift at `a`, travel and come down to `b` and ramp in again, s; the machine stops between.
     pub(super) fn lift_seconds(&self, a: DVec3, b: DVec3) -> f64 {
-        let rate = self.job.machine.max_rate_mm_per_min;
+        let machine = &self.job.machine;
+        let (rate, gain) = (machine.max_rate_mm_per_min / 60.0, machine.acceleration_mm_per_s2);
         let across: DVec2 = (b - a).truncate();
         let height_mm = self.height_mm(a.truncate(), b.truncate());
-        let vertical = (height_mm - a.z).max(0.0) + (height_mm - b.z).max(0.0);
-        let ramp = (self.job.clearance_mm + RAMP_GAP_MM) / libm::tan(self.job.ramp_rad);
-        60.0 * (vertical / rate.z
-            + across.length() / rate.x.min(rate.y)
-            + ramp / self.operation.feed_mm_per_min)
+        let [up, down] = [a, b].map(|p| rapid_seconds((height_mm - p.z).max(0.0), rate.z, gain.z));
+        let level = rapid_seconds(across.length(), rate.x.min(rate.y), gain.x.min(gain.y));
+        let entry = self.job.clearance_mm + GAP_MM / libm::tan(self.job.ramp_rad);
+        up + level + down + 60.0 * entry / self.operation.feed_mm_per_min
+    }
+}
+
+/// Time for a way from rest to rest, s.
+fn rapid_seconds(length_mm: f64, mm_per_s: f64, mm_per_s2: f64) -> f64 {
+    if length_mm * mm_per_s2 > mm_per_s * mm_per_s {
+        length_mm / mm_per_s + mm_per_s / mm_per_s2
+    } else {
+        2.0 * (length_mm / mm_per_s2).sqrt()
     }
 }

@@ -9,9 +9,10 @@ use super::chain::{Span, chains};
 use super::contours::{Edge, chords, contours, reached, runs_with};
 use super::emit::Emitter;
 use super::lead::{Side, with_leads};
-use super::left::{Left, Surfaces};
-use super::order::{Direction, in_order};
-use super::raster::{TOP_MM, clear_deep_wood, link};
+use super::left::Surfaces;
+use super::order::Direction;
+use super::pocket::{begun_at, is_closed, nearest_vertex};
+use super::raster::{TOP_MM, link};
 use super::trace::{DROP_MM, LEAST_ROUNDING_MM, Tracer};
 use super::travel::Travel;
 use super::{Site, ToolpathError};
@@ -58,7 +59,7 @@ pub(super) fn waterlines(site: &Site, lines: &Waterlines, block: &mut Block, out
         surfaces.left(lines.limit_mm, &profile, lines.step_mm)
     };
     let Some(mut wanted) = left(block) else { return };
-    let mut cells = lines.cells(&wanted);
+    let mut cells = lines.cells(|node| wanted.is_wanted(node));
     let low = cells.iter().map(|c| c.low).fold(f32::INFINITY, f32::min);
     let high = cells.iter().map(|c| c.high).fold(f32::NEG_INFINITY, f32::max);
     let (low, high) = (f64::from(low) + ABOVE_GROUND_MM, f64::from(high).min(TOP_MM));
@@ -74,11 +75,12 @@ pub(super) fn waterlines(site: &Site, lines: &Waterlines, block: &mut Block, out
         if spans.is_empty() {
             continue;
         }
-        cutter.ride(site, spans, Side::Left, block, out);
+        let way = Way { direction: Direction::Fixed, room: &[Side::Left] };
+        cutter.ride(site, nearest_first(spans), way, block, out);
         // The flank may have cleared the walls above.
         let Some(still) = left(block) else { return };
         wanted = still;
-        cells = lines.cells(&wanted);
+        cells = lines.cells(|node| wanted.is_wanted(node));
     }
 }
 
@@ -87,12 +89,13 @@ pub(super) fn waterlines(site: &Site, lines: &Waterlines, block: &mut Block, out
 pub(super) struct Contour {
     pub(super) scallop_mm: f64,
     pub(super) steeper_than_rad: f64,
-    pub(super) milling: Milling,
+    /// The side on which the wood is; `None`: either, whichever is quicker.
+    pub(super) milling: Option<Milling>,
 }
 
 /// Plans waterlines on all ground that is steep enough, from the top down, where wood is left, and takes them out of
 /// `block`. The levels are so close that the cusps between them keep to the scallop on the flattest ground that they cross.
-/// The moves go to `out`.
+/// From one level the cutter goes on to the next without lifting where that is quicker. The moves go to `out`.
 pub(super) fn contour(
     site: &Site,
     cut: &Contour,
@@ -101,7 +104,6 @@ pub(super) fn contour(
 ) -> Result<(), ToolpathError> {
     let profile = Profile::of(&site.operation.cutter);
     let step_mm = site.stepover_of(cut.scallop_mm)?;
-    clear_deep_wood(site, 0.0, block, out)?;
     let rolled = profile.rolled(LEAST_ROUNDING_MM);
     let tip = tip_field(site.target, &rolled);
     let reach = closing(&tip, &rolled);
@@ -112,9 +114,13 @@ pub(super) fn contour(
         limit_mm: cut.scallop_mm,
         fit_mm: site.job.tolerance.fit_mm,
     };
-    let surfaces = Surfaces { tip: &tip, reach: &reach, wood: block.field() };
-    let Some(wanted) = surfaces.left(lines.limit_mm, &profile, step_mm) else { return Ok(()) };
-    let mut cells = lines.cells(&wanted);
+    let mut cells = if site.finished {
+        let surfaces = Surfaces { tip: &tip, reach: &reach, wood: block.field() };
+        let Some(wanted) = surfaces.left(lines.limit_mm, &profile, step_mm) else { return Ok(()) };
+        lines.cells(|node| wanted.is_wanted(node))
+    } else {
+        lines.cells(|_| true)
+    };
     let steepest = libm::sin(cut.steeper_than_rad);
     cells.retain(|cell| lines.sine(cell) >= steepest);
     let is_steep = {
@@ -130,18 +136,43 @@ pub(super) fn contour(
         let (i, j) = (at.x as usize, at.y as usize);
         i < tip.grid().nx && j < tip.grid().ny && is_steep[j * tip.grid().nx + i]
     };
-    for z in lines.heights(&cells) {
-        let mut spans = lines.spans(&cells, z, &cutter, &work);
-        let mut room = Side::Left;
-        if cut.milling == Milling::Conventional {
-            room = Side::Right;
-            for span in &mut spans {
-                span.reverse();
+    let level = |z: f64| lines.spans(&cells, z, &cutter, &work);
+    let mut levels: Vec<Vec<Span>> = lines.heights(&cells).into_par_iter().map(level).collect();
+    if cut.milling == Some(Milling::Conventional) {
+        for span in levels.iter_mut().flatten() {
+            span.reverse();
+        }
+    }
+    begin_near(&mut levels);
+    let way = match cut.milling {
+        None => Way { direction: Direction::Both, room: &[Side::Left, Side::Right] },
+        Some(Milling::Climb) => Way { direction: Direction::Fixed, room: &[Side::Left] },
+        Some(Milling::Conventional) => Way { direction: Direction::Fixed, room: &[Side::Right] },
+    };
+    cutter.ride(site, levels, way, block, out);
+    Ok(())
+}
+
+/// Lets each closed line begin near the start of a line of the level above.
+fn begin_near(levels: &mut [Vec<Span>]) {
+    for k in 1..levels.len() {
+        let (above, here) = levels.split_at_mut(k);
+        for span in here[0].iter_mut().filter(|span| is_closed(span)) {
+            let plan: Vec<DVec2> = span.iter().map(|p| p.truncate()).collect();
+            let starts = above[k - 1].iter().map(|line| line[0].truncate());
+            let nearest = starts.map(|start| nearest_vertex(&plan, start));
+            if let Some((_, vertex)) = nearest.min_by(|a, b| a.0.total_cmp(&b.0)) {
+                *span = begun_at(std::mem::take(span), vertex);
             }
         }
-        cutter.ride(site, spans, room, block, out);
     }
-    Ok(())
+}
+
+/// How lines may be run: in which direction, and on which sides of them there may be room for leads.
+#[derive(Clone, Copy)]
+struct Way<'a> {
+    direction: Direction,
+    room: &'a [Side],
 }
 
 /// The corners of the cell at a node.
@@ -177,46 +208,37 @@ impl<'a> Rider<'a> {
         self.stock.contains(p) && self.slim.clears(p, z + DROP_MM)
     }
 
-    /// Cuts the spans of a level, which have room on one side, and takes them out of `block`.
+    /// Cuts rows of spans and takes them out of `block`.
     fn ride(
         &self,
         site: &Site,
-        spans: Vec<Span>,
-        room: Side,
+        rows: Vec<Vec<Span>>,
+        way: Way,
         block: &mut Block,
         out: &mut Emitter,
     ) {
-        if spans.is_empty() {
-            return;
-        }
         let (pitch_mm, fit_mm) = (site.target.grid().pitch_mm, site.job.tolerance.fit_mm);
         let tracer =
             Tracer::new(|p: DVec2| self.exact.drop(p), self.rolled.clone(), pitch_mm, fit_mm);
-        let wood = Dropper::new(block.field(), self.profile.clone());
         let travel = Travel::new(site.job, site.operation, block);
         let link = |done: &[DVec3], next: &[DVec3]| link(site, &travel, &tracer, done, next);
-        let before = out.moves().len();
         let radius_mm = LEAD_PER_DIAMETER * site.operation.cutter.working_mm();
-        let chains = chains(nearest_first(spans), Direction::Fixed, link);
+        let chains = chains(rows, way.direction, link);
         let chains = chains
             .into_iter()
-            .map(|chain| with_leads(chain, room, radius_mm, |p, z| self.is_free(p, z)));
-        for chain in in_order(chains.collect(), Direction::Fixed, out.at()) {
-            let touch_mm = wood.drop(chain[0].truncate());
-            out.chain(&chain, touch_mm, &travel);
-        }
-        out.cut(before, &self.profile, block);
+            .map(|chain| with_leads(chain, way.room, radius_mm, |p, z| self.is_free(p, z)));
+        out.passes(chains.collect(), way.direction, &self.profile, block);
     }
 }
 
 impl Waterlines<'_> {
     /// The cells with a wanted corner.
-    fn cells(&self, wanted: &Left) -> Vec<Cell> {
+    fn cells(&self, is_wanted: impl Fn(usize) -> bool + Sync) -> Vec<Cell> {
         let grid = self.tip.grid();
         let z = self.tip.z();
         let cell = |node: usize| {
             let corners = corners(node, grid.nx);
-            corners.iter().any(|&k| wanted.is_wanted(k)).then(|| {
+            corners.iter().any(|&k| is_wanted(k)).then(|| {
                 let heights = corners.map(|k| z[k]);
                 let low = heights.into_iter().fold(f32::INFINITY, f32::min);
                 let high = heights.into_iter().fold(f32::NEG_INFINITY, f32::max);
@@ -346,7 +368,7 @@ mod tests {
         let profile = Profile::Flat { radius_mm: 1e-6 };
         let exact = Dropper::new(&cone, profile);
         let lines = lines(&cone);
-        let cells = lines.cells(&Left::everywhere(grid));
+        let cells = lines.cells(|_| true);
         for (z, r) in [(-1.0, 2.0), (-2.0, 4.0), (-3.5, 7.0)] {
             let contours = lines.contours(&cells, z, &exact);
             assert_eq!(contours.len(), 1);
@@ -366,7 +388,7 @@ mod tests {
         let hills = Heightfield::from_fn(grid, |p| 3.0 * (hill(p, 8.0) + hill(p, 16.0)) - 4.0);
         let exact = Dropper::new(&hills, Profile::Flat { radius_mm: 1e-6 });
         let lines = lines(&hills);
-        let cells = lines.cells(&Left::everywhere(grid));
+        let cells = lines.cells(|_| true);
         // The saddle lies at 3 * 2 exp(-2) - 4 = -3.19.
         assert_eq!(lines.contours(&cells, -3.0, &exact).len(), 2);
         assert_eq!(lines.contours(&cells, -3.4, &exact).len(), 1);
