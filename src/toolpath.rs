@@ -21,6 +21,7 @@ mod left;
 mod levels;
 mod order;
 mod pocket;
+mod quicker;
 mod ramp;
 mod raster;
 mod rough;
@@ -276,9 +277,11 @@ fn plan_from(
             OperationKind::Finish { scallop_mm, follow, angle_rad } => {
                 let outlines = match follow {
                     Follow::Direction => None,
-                    Follow::Outlines => Some(grounds.outline_distance()),
+                    Follow::Quicker | Follow::Outlines => Some(grounds.outline_distance()),
                 };
-                let cut = Finish { scallop_mm, angle_rad, outlines: outlines.as_ref() };
+                let outlines = outlines.as_ref();
+                let is_free = follow == Follow::Quicker;
+                let cut = Finish { scallop_mm, angle_rad, outlines, is_free };
                 finish::finish(&site, &cut, block, &mut out)?;
             }
         }

@@ -182,7 +182,7 @@ pub(super) const TRACE_METHODS: &[&str] = &["auto", "crack", "moore", "grey"];
 pub(super) const MILLINGS: &[&str] = &["climb", "conventional"];
 
 /// Names of [`super::Follow`], in its order.
-pub(super) const FOLLOWS: &[&str] = &["direction", "outlines"];
+pub(super) const FOLLOWS: &[&str] = &["quicker", "direction", "outlines"];
 
 const LENGTH: f64 = 10_000.0;
 
@@ -793,8 +793,8 @@ pub(super) static OPERATION: Section = Section {
         key(
             "follow",
             Kind::Choice(FOLLOWS),
-            Text("direction"),
-            "finish: what the first passes follow: one direction (angle_deg), or the outlines of the artwork",
+            Text("quicker"),
+            "finish: what the first passes follow: one direction (angle_deg), the outlines of the artwork, or what is quicker",
         ),
         key(
             "milling",

@@ -153,7 +153,7 @@ fn operation(
         stepover_mm: table.number("stepover_mm"),
         scallop_mm: table.number("scallop_mm"),
         pattern: table.choice("pattern"),
-        follow: [Follow::Direction, Follow::Outlines][table.choice("follow")],
+        follow: [Follow::Quicker, Follow::Direction, Follow::Outlines][table.choice("follow")],
         milling: [Milling::Climb, Milling::Conventional][table.choice("milling")],
         steeper_than_rad: table.sure_number("steeper_than_deg").to_radians(),
         within: read_within(table)?,

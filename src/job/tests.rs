@@ -198,7 +198,7 @@ fn defaults_are_those_of_the_product() {
     };
     assert_eq!(leave_mm, 0.5);
     let finish =
-        OperationKind::Finish { scallop_mm: 0.01, follow: Follow::Direction, angle_rad: 0.0 };
+        OperationKind::Finish { scallop_mm: 0.01, follow: Follow::Quicker, angle_rad: 0.0 };
     assert_eq!(job.operations[1].kind, finish);
     // Beech, 2 flutes, 18000 1/min: 0.044 x 2 x 18000 = 1584 mm/min, plunge a quarter.
     let rough = &job.operations[0];

@@ -524,8 +524,8 @@ pub enum OperationKind {
         /// Side of the wood.
         milling: Milling,
     },
-    /// Passes that leave no more than a scallop height on any slope: parallel ones over everything, then passes
-    /// across wherever those left more.
+    /// Passes that leave no more than a scallop height on any slope: waterlines on steep ground, passes over the rest, then
+    /// more wherever those left too much.
     Finish {
         /// Height of the cusps, mm.
         scallop_mm: f64,
@@ -563,6 +563,8 @@ pub enum Pattern {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Follow {
+    /// Whichever of the two is estimated to take less time.
+    Quicker,
     /// One direction: parallel passes, to and fro.
     Direction,
     /// The outlines of the artwork: passes at even distances from them (contour-parallel).

@@ -232,7 +232,12 @@ fn most_nearby(moves: &[Move], figure: impl Fn(usize) -> f64) -> Vec<f64> {
 
 /// Speed of a straight feed move, mm/min: `most_mm_per_min`, but so that it goes down no faster than the plunge limit
 /// and no axis exceeds its highest rate; whole numbers (tens above 200), so that speeds repeat.
-fn feed(way: DVec3, most_mm_per_min: f64, operation: &Operation, machine: &Machine) -> f64 {
+pub(super) fn feed(
+    way: DVec3,
+    most_mm_per_min: f64,
+    operation: &Operation,
+    machine: &Machine,
+) -> f64 {
     let length = way.length();
     let mut most = most_mm_per_min;
     for axis in 0..3 {

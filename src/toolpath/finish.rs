@@ -11,6 +11,7 @@
 
 use super::emit::Emitter;
 use super::left::Surfaces;
+use super::quicker::outlines_are_quicker;
 use super::raster::{First, Passes, clear_deep_wood, passes, passes_where_wood_is_left};
 use super::trace::LEAST_ROUNDING_MM;
 use super::waterline::{Contour, Waterlines, contour, waterlines};
@@ -43,6 +44,8 @@ pub(super) struct Finish<'a> {
     pub(super) angle_rad: f64,
     /// Distance from the outlines that the first passes follow, mm; `None`: they are parallel.
     pub(super) outlines: Option<&'a Heightfield>,
+    /// They may be parallel all the same, where that is quicker.
+    pub(super) is_free: bool,
 }
 
 /// Plans the passes; the moves go to `out`.
@@ -52,15 +55,20 @@ pub(super) fn finish(
     block: &mut Block,
     out: &mut Emitter,
 ) -> Result<(), ToolpathError> {
-    let Finish { scallop_mm, angle_rad, outlines } = *cut;
+    let Finish { scallop_mm, angle_rad, mut outlines, is_free } = *cut;
     let profile = Profile::of(&site.operation.cutter);
     let stepover_mm = site.stepover_of(scallop_mm)?;
     clear_deep_wood(site, angle_rad, block, out)?;
     let limit_mm = scallop_mm + SPARE * site.job.tolerance.gouge_mm;
+    // Where parallel passes could leave more than the limit: cusps grow by 1 / cos^2 of a slope across them.
+    let steeper_than_rad = libm::acos((scallop_mm / limit_mm).sqrt()).min(STEEP_RAD);
+    let rolled = profile.rolled(LEAST_ROUNDING_MM);
+    let tip = tip_field(site.target, &rolled);
+    outlines = outlines.filter(|distance| {
+        !is_free || outlines_are_quicker(site, angle_rad, steeper_than_rad, &tip, distance)
+    });
     let mut site = *site;
     if !site.finished {
-        // Where parallel passes could leave more than the limit: cusps grow by 1 / cos^2 of a slope across them.
-        let steeper_than_rad = libm::acos((scallop_mm / limit_mm).sqrt()).min(STEEP_RAD);
         let cut = Contour { scallop_mm, steeper_than_rad, milling: None };
         contour(&site, &cut, block, out)?;
         site.finished = true;
@@ -70,8 +78,6 @@ pub(super) fn finish(
     let deepest_mm = passes_where_wood_is_left(site, &first, limit_mm, block, out)?;
     let Some(deepest_mm) = deepest_mm else { return Ok(()) };
     out.note_deep_pass(deepest_mm);
-    let rolled = profile.rolled(LEAST_ROUNDING_MM);
-    let tip = tip_field(site.target, &rolled);
     let reach = closing(&tip, &rolled);
     let stepover_mm = FRAC_1_SQRT_2 * stepover_mm;
     let lines = Waterlines {
