@@ -515,7 +515,7 @@ pub enum OperationKind {
         /// How a level is cleared.
         pattern: Pattern,
     },
-    /// Waterlines: the cutter goes round steep ground at constant Z, from the top down.
+    /// Waterlines: the cutter goes round steep ground at constant Z, level by level.
     Contour {
         /// Height of the cusps, mm.
         scallop_mm: f64,

@@ -93,9 +93,11 @@ pub(super) struct Contour {
     pub(super) milling: Option<Milling>,
 }
 
-/// Plans waterlines on all ground that is steep enough, from the top down, where wood is left, and takes them out of
-/// `block`. The levels are so close that the cusps between them keep to the scallop on the flattest ground that they cross.
-/// From one level the cutter goes on to the next without lifting where that is quicker. The moves go to `out`.
+/// Plans waterlines on all ground that is steep enough, where wood is left, and takes them out of `block`. The levels are
+/// so close that the cusps between them keep to the scallop on the flattest ground that they cross. From one level the
+/// cutter goes down to the next without lifting where that is quicker; such chains of levels are in the order of least
+/// travel, so one may be cut while wood of another still stands above it: no more than roughing has left, whose
+/// thickness sets the feed. The moves go to `out`.
 pub(super) fn contour(
     site: &Site,
     cut: &Contour,
