@@ -16,6 +16,7 @@
 //! | `skeleton` | `Region` -> resampled rings, constrained Delaunay triangles, classes T/S/J, cells, runs, spine | geom job outline |
 //! | `surface` | region + cells + layer settings -> `Mesh` or height field; one file per method | geom job outline skeleton |
 //! | `relief` | layers' surfaces -> the relief heightfield: rasterise, combine, blend, background: the *target* | geom job outline surface |
+//! | `compare` | one artwork, or the known shapes of the tables, raised by every method -> what each surface measures | geom job outline skeleton surface relief |
 //! | `offset` | heightfield x cutter -> tool-tip field and exact drops at points | geom job cutter relief |
 //! | `stock` | the wood as a heightfield; removes plain moves of a cutter from it | geom job cutter |
 //! | `motion` | plain moves, one after another -> time, speed, position: GRBL's planner as a model, incremental | geom job |
@@ -37,6 +38,7 @@ pub mod outline;
 pub mod skeleton;
 pub mod surface;
 pub mod relief;
+pub mod compare;
 pub mod offset;
 pub mod stock;
 pub mod motion;

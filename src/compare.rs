@@ -1,0 +1,5 @@
+//! Outlines raised by every method -> what each surface measures.
+
+mod measures;
+
+pub use measures::{Gauge, Measures};
