@@ -6,10 +6,8 @@
 #[path = "../tests/shapes/mod.rs"]
 mod shapes;
 
-use shapes::measure::{
-    CREASES, Ladder, Measures, Method, Outline, Raised, crease, raise_all, summary,
-};
-use shapes::{FINE, shapes};
+use relievo::compare::tables::{CREASES, FINE, Method, Outline, Raised, crease, shapes, summary};
+use shapes::Ladder;
 use std::time::Instant;
 
 fn main() {
@@ -35,21 +33,16 @@ fn main() {
     for (outline, name) in [(Outline::Own, "own"), (Outline::FourPoint, "four-point")] {
         for method in Method::ALL {
             let start = Instant::now();
-            let (each, faces) = raise_all(&all, outline, method);
+            let got = summary(&all, outline, method);
             let seconds = start.elapsed().as_secs_f64();
-            let each: Vec<_> = each
-                .iter()
-                .zip(&all)
-                .map(|((raised, patch), shape)| (shape.name, Measures::of(shape, raised, patch)))
-                .collect();
             print!("| {name} | {} |", method.name());
-            for (got, tabled) in summary(&each).iter().zip(method.tabled()) {
+            for (got, tabled) in got.figures.iter().zip(method.tabled()) {
                 match tabled {
                     Some(tabled) => print!(" {got:.4} / {tabled} |"),
                     None => print!(" {got:.4} / - |"),
                 }
             }
-            println!(" {}k | {seconds:.2} |", faces / all.len() / 1000);
+            println!(" {}k | {seconds:.2} |", got.faces / all.len() / 1000);
         }
     }
     println!("\n| shape | rungs 0.1 apart | least step | largest step | imbalance rms |");

@@ -13,7 +13,7 @@ mod raster;
 pub use combine::{feather_weight, joined, smooth_max, smooth_min};
 pub use coverage::coverage;
 pub use ground::Grounds;
-pub use merge::merge;
+pub use merge::{merge, sampled};
 pub use raster::{Raster, rasterise};
 
 use crate::geom::{Grid, GridError, Heightfield};

@@ -227,8 +227,11 @@ fn prepare<'a>(
     Ok(layers)
 }
 
-/// The heights of a surface at the nodes, and at how many of them a mesh lies twice.
-fn sampled(
+/// The heights of a figure's surface at the nodes, walls under their draft, and at how many of them a mesh lies twice.
+///
+/// # Errors
+/// [`ReliefError::BadMesh`] and [`ReliefError::MeshTooWide`].
+pub fn sampled(
     surface: Surface,
     layer: &LayerSpec,
     figure: &Figure,
