@@ -13,6 +13,8 @@ mod observe;
 mod outcome;
 mod ports;
 mod stream;
+mod surfaces;
+mod tables;
 mod time;
 
 use clap::{Parser, Subcommand};
@@ -49,6 +51,8 @@ enum Command {
     Check(check::Args),
     /// Write a commented job file for artwork, one layer for each colour found
     New(new::Args),
+    /// Compare all surface methods over artwork: pictures, cross-sections and figures side by side
+    Surfaces(surfaces::Args),
     /// Tell how long a program takes on a machine, by GRBL's own planner
     Time(time::Args),
     /// Send a program to a GRBL router, a network controller or the simulation, and watch over it
@@ -104,6 +108,7 @@ pub fn main() -> ExitCode {
         Command::Carve(args) => carve::run(&args),
         Command::Check(args) => check::run(&args),
         Command::New(args) => new::run(&args),
+        Command::Surfaces(args) => surfaces::run(&args),
         Command::Time(args) => time::run(&args),
         Command::Stream(args) => stream::run(&args),
         Command::Ports(args) => ports::run(&args),

@@ -10,6 +10,7 @@
 //!   deviation   --> deviation_png  what is left above the target or cut below it
 //!   moves       --> paths_png      toolpaths over the board, coloured by depth
 //!   ReportData  --> html, summary  the whole job on one page, and in a dozen lines
+//!   SideBySide  --> surfaces_png, surfaces_html, surfaces_text   one artwork by every method
 //! ```
 
 mod canvas;
@@ -28,6 +29,7 @@ mod skeleton;
 mod stl;
 mod strokes;
 mod summary;
+mod surfaces;
 
 pub use data::{
     Check, CutterRow, LayerRow, LeftoverRow, Picture, ProgramRow, ReportData, StockFacts,
@@ -40,6 +42,7 @@ pub use shade::{Look, shaded_png};
 pub use skeleton::skeleton_svg;
 pub use stl::{stl, stl_every_nth_node};
 pub use summary::summary;
+pub use surfaces::{SideBySide, surface_png, surfaces_html, surfaces_png, surfaces_text};
 
 /// Why a picture or a mesh cannot be made.
 #[derive(Debug, thiserror::Error)]

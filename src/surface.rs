@@ -34,6 +34,7 @@ pub use inscribed::inscribed_radius;
 pub use inside::inside_spans;
 pub use literal::{Over, patches};
 pub use mesh::{Mesh, MeshError};
+pub use notes::tell;
 pub use patch::{FINE, FINE_ROWS, Patch, Window, averaged, finer};
 pub use profile::{capped_height, outline_height, profile_at, smooth_cap};
 pub use ratio::{

@@ -600,6 +600,75 @@ fn every_note_is_said_once() {
     assert_eq!(said.matches("'op'").count(), 1, "{said}");
 }
 
+/// What the leaf's surfaces are compared with in these tests: coarse, so that it is quick.
+const SURFACES: [&str; 6] =
+    ["surfaces", "leaf.svg", "--pitch", "0.2", "--method", "ruled,loop,profile"];
+
+#[test]
+fn surfaces_of_artwork_give_a_table_a_picture_and_a_page() {
+    let desk = leaf_desk();
+    let out = desk.run(&[&SURFACES[..], &["--each"]].concat());
+    assert_eq!(out.status.code(), Some(0), "{}", stderr(&out));
+    let said = String::from_utf8_lossy(&out.stdout).into_owned();
+    for row in ["method", "ruled", "loop", "profile"] {
+        assert_eq!(said.lines().filter(|l| l.starts_with(row)).count(), 1, "{row}:\n{said}");
+    }
+    let drawn_in = said.lines().find(|l| l.starts_with("loop")).unwrap();
+    assert!(drawn_in.contains("outline drawn in"), "{said}");
+    assert!(!said.contains("time"), "{said}");
+    let files = desk.files();
+    for name in ["surfaces.png", "ruled.png", "loop.png", "profile.png"] {
+        assert!(files[&format!("leaf-surfaces/{name}")].starts_with(b"\x89PNG"), "{name}");
+    }
+    let page = String::from_utf8(files["leaf-surfaces/surfaces.html"].clone()).unwrap();
+    assert!(page.contains("data:image/png;base64,") && page.contains("outline drawn in"));
+    assert!(!page.contains("href=") && !page.contains("<script"), "it needs nothing else");
+    assert_eq!(files.keys().filter(|n| n.starts_with("leaf-surfaces/")).count(), 5);
+}
+
+#[test]
+fn surfaces_are_the_same_bytes_with_one_and_two_threads() {
+    let desks = ["1", "2"].map(|threads| {
+        let desk = leaf_desk();
+        let out = desk.run(&[&SURFACES[..], &["--json", "--threads", threads]].concat());
+        assert_eq!(out.status.code(), Some(0), "{}", stderr(&out));
+        (desk.files(), out.stdout)
+    });
+    assert!(desks[0] == desks[1]);
+}
+
+#[test]
+fn surfaces_tell_their_figures_to_scripts_and_times_when_asked() {
+    let desk = leaf_desk();
+    let args = ["--outline", "2", "--height", "2.5", "--json"];
+    let told = json_of(&desk.run(&[&SURFACES[..], &args].concat()));
+    assert_eq!((&told["parts"], &told["pitch_mm"]), (&1.into(), &0.2.into()));
+    let methods = told["methods"].as_array().unwrap();
+    let names: Vec<_> = methods.iter().map(|m| m["method"].as_str().unwrap()).collect();
+    assert_eq!(names, ["ruled", "loop", "profile"]);
+    // The ruled surface keeps the height, Loop's sinks.
+    let highest = |k: usize| methods[k]["measures"]["highest"].as_f64().unwrap();
+    assert!((highest(0) - 2.5).abs() < 0.05 && highest(1) < 2.2, "{told:#}");
+    assert!(methods[0].get("seconds").is_none());
+    let timed = desk.run(&[&SURFACES[..], &["--json", "--timings"]].concat());
+    assert!(json_of(&timed)["methods"][0]["seconds"].as_f64().unwrap() > 0.0);
+    assert!(stderr(&timed).contains("timings"));
+}
+
+#[test]
+fn surfaces_that_cannot_be_compared_are_refused() {
+    let desk = leaf_desk();
+    refused(&desk, &["surfaces", "leaf.toml", "--layer", "stem"], 1, &["'stem'", "leaf, blade"]);
+    refused(&desk, &["surfaces", "leaf.svg", "--outline", "3"], 1, &["outline 3", "from 1 to 2"]);
+    refused(&desk, &["surfaces", "leaf.svg", "--pitch", "0.001"], 1, &["--pitch"]);
+    refused(&desk, &["surfaces", "leaf.svg", "--method", "wax"], 2, &["'wax'", "ruled"]);
+    refused(&desk, &["surfaces", "leaf.svg", "--height", "0"], 2, &["above 0"]);
+    refused(&desk, &["surfaces", "leaf.svg", "--figures"], 2, &["--figures"]);
+    refused(&desk, &["surfaces", "lost.svg"], 1, &["lost.svg"]);
+    refused(&desk, &["surfaces"], 2, &["INPUT"]);
+    refused(&desk, &["surfaces", "--figures", "--method", "butterfly-original"], 2, &["tabled"]);
+}
+
 #[test]
 fn wrong_usage_exits_with_two() {
     let desk = leaf_desk();

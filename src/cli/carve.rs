@@ -1,6 +1,6 @@
 //! `relievo carve`: the whole job, from artwork to proved programs and pictures.
 
-use super::files::{self, Outputs};
+use super::files::{self, EarlierPrograms, Outputs};
 use super::observe::{self, Stages};
 use super::{Stop, inputs, memory, outcome};
 use crate::outline::Region;
@@ -66,7 +66,7 @@ pub(super) fn run(args: &Args) -> Result<(), Stop> {
     for (name, bytes) in &made {
         outputs.add(name, bytes)?;
     }
-    outputs.commit()?;
+    outputs.commit(EarlierPrograms::TakeAway)?;
     let timings = stages.finish();
     if args.json {
         observe::say(&outcome::json(&carving, &folder)?)?;

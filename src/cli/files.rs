@@ -68,6 +68,15 @@ pub(super) struct Outputs {
     staging: Staging,
 }
 
+/// What becomes of programs in the folder that an earlier run wrote and this one does not replace.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum EarlierPrograms {
+    /// They go: the folder never holds programs of two different jobs.
+    TakeAway,
+    /// They stay: this run has no programs of its own.
+    Keep,
+}
+
 /// What this run has begun. A signal arrives on another thread and has nothing else to know it by.
 static BEGUN: Mutex<Option<Staging>> = Mutex::new(None);
 
@@ -134,23 +143,25 @@ impl Outputs {
         Ok(())
     }
 
-    /// Moves all files in and takes away programs of an earlier run that this one did not make, so that
-    /// the folder never holds programs of two different jobs.
-    pub(super) fn commit(self) -> Result<()> {
+    /// Moves all files in.
+    pub(super) fn commit(self, earlier: EarlierPrograms) -> Result<()> {
         let held = begun(); // signals wait
-        let done = self.move_in(&self.staging.path);
+        let done = self.move_in(&self.staging.path, earlier);
         drop(held);
         done
     }
 
-    fn move_in(&self, staged: &Path) -> Result<()> {
+    fn move_in(&self, staged: &Path, earlier: EarlierPrograms) -> Result<()> {
         for name in &self.names {
             let to = self.folder.join(name);
             if to.is_dir() {
                 bail!("{} is a folder; move it away", to.display());
             }
         }
-        let stale = self.earlier_programs()?;
+        let stale = match earlier {
+            EarlierPrograms::TakeAway => self.earlier_programs()?,
+            EarlierPrograms::Keep => Vec::new(),
+        };
         let replaced = self.names.iter().map(|n| self.folder.join(n)).filter(|p| p.exists());
         let mut aside: Vec<(PathBuf, PathBuf)> = Vec::new();
         let mut moved: Vec<PathBuf> = Vec::new();
@@ -239,12 +250,22 @@ mod tests {
         write("notes.txt", "keep");
         let mut out = Outputs::prepare(dir.path()).unwrap();
         out.add("1-new.nc", b"(relievo 0.1.0)\n").unwrap();
-        out.commit().unwrap();
+        out.commit(EarlierPrograms::TakeAway).unwrap();
         let mut names: Vec<_> = fs::read_dir(dir.path())
             .unwrap()
             .map(|e| e.unwrap().file_name().into_string().unwrap())
             .collect();
         names.sort();
         assert_eq!(names, ["1-new.nc", "4-mine.nc", "notes.txt"]);
+    }
+
+    #[test]
+    fn a_run_without_programs_of_its_own_leaves_earlier_ones() {
+        let dir = tempfile::tempdir().unwrap();
+        fs::write(dir.path().join("1-rough.nc"), "(relievo 0.1.0)\nG21\n").unwrap();
+        let mut out = Outputs::prepare(dir.path()).unwrap();
+        out.add("surfaces.png", b"picture").unwrap();
+        out.commit(EarlierPrograms::Keep).unwrap();
+        assert!(dir.path().join("1-rough.nc").exists() && dir.path().join("surfaces.png").exists());
     }
 }

@@ -231,6 +231,47 @@ fn read_surface(layer: &Table<'_>) -> Result<SurfaceSpec, JobError> {
     surface_of(&table, method)
 }
 
+impl SurfaceSpec {
+    /// The methods as job files name them.
+    pub const METHODS: &[&str] = METHODS;
+
+    /// The same surface by another method: skeleton, crest and cross-section are kept where the other method knows them,
+    /// all else has its default. `None` when there is no such method.
+    pub fn by(&self, method: &str) -> Option<Self> {
+        if self.method() == method {
+            return Some(self.clone());
+        }
+        if !METHODS.contains(&method) {
+            return None;
+        }
+        let (source, nothing) = (Source::default(), DeTable::new());
+        // The defaults go together.
+        let mut other = surface_of(&Table::unchecked(&source, &SURFACE, &nothing), method).ok()?;
+        let flank = match self {
+            Self::Profile { profile, .. } | Self::RFunction { profile, .. } => *profile,
+            Self::ScanLines { .. } | Self::Teddy(_) => Profile::Parabola,
+            _ => self.crest().map_or(Profile::Parabola, |crest| crest.profile),
+        };
+        match &mut other {
+            Self::Profile { profile, .. } | Self::RFunction { profile, .. } => *profile = flank,
+            _ => {}
+        }
+        if let (Some(ours), Some(theirs)) = (self.crest(), other.crest_mut()) {
+            let join = theirs.skeleton.join;
+            let (profile, width_power) = (theirs.profile, theirs.width_power);
+            *theirs = ours.clone();
+            match method {
+                "teddy" => (theirs.profile, theirs.width_power) = (profile, width_power),
+                "patches" => (theirs.profile, theirs.skeleton.join) = (profile, join),
+                _ => theirs.profile = flank,
+            }
+        } else if let Some(crest) = other.crest_mut().filter(|_| method != "teddy") {
+            crest.profile = if method == "patches" { Profile::Parabola } else { flank };
+        }
+        Some(other)
+    }
+}
+
 /// True when a surface method uses this key of the surface's table.
 fn uses(method: &str, key: &str) -> bool {
     let subdivides = Scheme::ALL.iter().any(|scheme| scheme.name() == method);

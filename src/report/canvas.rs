@@ -208,6 +208,20 @@ impl Canvas {
 
     /// The page as an RGB PNG. `pixels_per_mm` makes it print at its true size.
     pub(super) fn into_png(self, pixels_per_mm: Option<f64>) -> Result<Vec<u8>, ReportError> {
+        let (w, h, rgb) = self.rgb();
+        let form = Form { color: png::ColorType::Rgb, pixels_per_mm, packing: Packing::Fast };
+        encode(w, h, &form, &rgb, &[])
+    }
+
+    /// The page as an RGB PNG that is small rather than quickly made.
+    pub(super) fn into_small_png(self) -> Result<Vec<u8>, ReportError> {
+        let (w, h, rgb) = self.rgb();
+        let form =
+            Form { color: png::ColorType::Rgb, pixels_per_mm: None, packing: Packing::Small };
+        encode(w, h, &form, &rgb, &[])
+    }
+
+    fn rgb(&self) -> (u32, u32, Vec<u8>) {
         let (w, h) = (self.pixmap.width(), self.pixmap.height());
         let mut rgb = vec![0_u8; w as usize * h as usize * 3];
         rgb.par_chunks_mut(3 * w as usize)
@@ -217,7 +231,7 @@ impl Canvas {
                     o.copy_from_slice(&p[..3]);
                 }
             });
-        encode(w, h, png::ColorType::Rgb, &rgb, pixels_per_mm, &[])
+        (w, h, rgb)
     }
 }
 
@@ -228,22 +242,42 @@ fn paint(color: Rgb, opacity: f32) -> Paint<'static> {
     paint
 }
 
+/// How a PNG is packed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Packing {
+    /// In little time.
+    Fast,
+    /// Into little room.
+    Small,
+}
+
+/// The form of a PNG.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Form {
+    pub(super) color: png::ColorType,
+    /// Makes it print at its true size.
+    pub(super) pixels_per_mm: Option<f64>,
+    pub(super) packing: Packing,
+}
+
 /// Encodes samples (8 bits a channel, or 16 bits big-endian for grey) as a PNG with text chunks.
 pub(super) fn encode(
     width: u32,
     height: u32,
-    color: png::ColorType,
+    form: &Form,
     samples: &[u8],
-    pixels_per_mm: Option<f64>,
     notes: &[(&str, String)],
 ) -> Result<Vec<u8>, ReportError> {
     let mut bytes = Vec::with_capacity(samples.len() / 3);
     let mut encoder = png::Encoder::new(&mut bytes, width, height);
-    encoder.set_color(color);
-    let deep = color == png::ColorType::Grayscale;
+    encoder.set_color(form.color);
+    let deep = form.color == png::ColorType::Grayscale;
     encoder.set_depth(if deep { png::BitDepth::Sixteen } else { png::BitDepth::Eight });
-    encoder.set_compression(png::Compression::Fast);
-    if let Some(density) = pixels_per_mm {
+    encoder.set_compression(match form.packing {
+        Packing::Fast => png::Compression::Fast,
+        Packing::Small => png::Compression::High,
+    });
+    if let Some(density) = form.pixels_per_mm {
         let per_metre = (density * 1000.0).round().clamp(1.0, 1.0e9) as u32;
         encoder.set_pixel_dims(Some(png::PixelDimensions {
             xppu: per_metre,

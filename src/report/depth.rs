@@ -1,6 +1,9 @@
 //! The depth map: 16-bit grey, one pixel a node, lossless within one of 65535 steps.
 
-use super::{ReportError, canvas::encode};
+use super::{
+    ReportError,
+    canvas::{Form, Packing, encode},
+};
 use crate::geom::Heightfield;
 use rayon::prelude::*;
 
@@ -45,7 +48,12 @@ pub fn depth_png(field: &Heightfield) -> Result<Vec<u8>, ReportError> {
         ("origin_x_mm", (grid.origin.x + 0.0).to_string()),
         ("origin_y_mm", (grid.origin.y + 0.0).to_string()),
     ];
-    encode(w, h, png::ColorType::Grayscale, &samples, Some(1.0 / grid.pitch_mm), &notes)
+    let form = Form {
+        color: png::ColorType::Grayscale,
+        pixels_per_mm: Some(1.0 / grid.pitch_mm),
+        packing: Packing::Fast,
+    };
+    encode(w, h, &form, &samples, &notes)
 }
 
 /// Lowest and highest height; an error when a height is infinite or not a number.

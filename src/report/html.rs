@@ -3,7 +3,7 @@
 use super::data::{Picture, ReportData, duration, grouped, percent, short};
 use maud::{DOCTYPE, Markup, PreEscaped, html as markup};
 
-const STYLE: &str = include_str!("report.css");
+pub(super) const STYLE: &str = include_str!("report.css");
 
 /// The whole job as one HTML page: verdict and pictures first, then stock, layers, cutters, programs,
 /// every check, leftover and notes. It refers to nothing outside itself, has no scripts, and is laid
@@ -262,7 +262,7 @@ fn notes(notes: &[String]) -> Markup {
     }
 }
 
-fn data_uri(png: &[u8]) -> String {
+pub(super) fn data_uri(png: &[u8]) -> String {
     let mut uri = String::from("data:image/png;base64,");
     uri.reserve(png.len().div_ceil(3) * 4);
     base64(png, &mut uri);

@@ -43,7 +43,12 @@ impl Plane {
     /// area of each pixel, or enlarged by a quadratic B-spline (smooth, never overshooting).
     pub(super) fn of(field: &Heightfield) -> Self {
         let grid = field.grid();
-        let (w, h) = size_px(grid.nx, grid.ny);
+        Self::sized(field, size_px(grid.nx, grid.ny))
+    }
+
+    /// The same for a size in pixels that is given.
+    pub(super) fn sized(field: &Heightfield, (w, h): (usize, usize)) -> Self {
+        let grid = field.grid();
         let mm_per_px = grid.pitch_mm * grid.nx as f64 / w as f64;
         if (w, h) == (grid.nx, grid.ny) {
             let mut v = vec![0.0_f32; w * h];

@@ -48,6 +48,9 @@ impl Look {
 /// its form can still be read; by a factor of 1.8 at most.
 const LEAST_DEPTH: f64 = 0.05;
 
+/// Heights in pictures that are held against each other, multiplied by this for the light.
+const EVEN_LIGHT: f64 = 1.0;
+
 /// The hill-shaded relief as an RGB PNG: one soft sun from the upper left, a sky that leaves hollows
 /// and the foot of walls dark, and soft cast shadows (horizon sweeps over 45 lights, in the manner of
 /// Kennelly and Stewart, 2006).
@@ -99,6 +102,18 @@ pub fn shaded_png(
     let right = page_w - text_left;
     draw_scale_bar(&mut canvas, right - bar_px, base, bar_px, unit, &format!("{} mm", short(bar)));
     canvas.into_png(density)
+}
+
+/// The shaded relief brought to a size in pixels, for sheets with many of them: heights are lit as they are, so that
+/// one can be held against another.
+pub(super) fn shaded_image(
+    field: &Heightfield,
+    look: Look,
+    size_px: (usize, usize),
+) -> Result<Image, ReportError> {
+    finite_range(field, "shaded picture")?;
+    let plane = Plane::sized(field, size_px);
+    Ok(colored(&plane, &lighting(&plane, EVEN_LIGHT), look))
 }
 
 /// By how much heights are multiplied for the light.

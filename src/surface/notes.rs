@@ -5,13 +5,8 @@ use crate::geom::DVec2;
 use crate::job::LayerSpec;
 use std::collections::BTreeMap;
 
-/// Counts the remarks on one layer up into notes.
-pub(super) fn tell(
-    layer: &LayerSpec,
-    remarks: &[(&str, Remark)],
-    pitch_mm: f64,
-    notes: &mut Vec<String>,
-) {
+/// Counts the remarks on one layer, each with the source of its figure, up into notes.
+pub fn tell(layer: &LayerSpec, remarks: &[(&str, Remark)], pitch_mm: f64, notes: &mut Vec<String>) {
     let mut kinds: BTreeMap<usize, Worst> = BTreeMap::new();
     for &(source, remark) in remarks {
         let (kind, rank) = rank(&remark);
