@@ -656,6 +656,15 @@ fn surfaces_tell_their_figures_to_scripts_and_times_when_asked() {
 }
 
 #[test]
+fn surfaces_of_artwork_beyond_any_machine_can_be_looked_at() {
+    let desk = leaf_desk();
+    desk.put("wall.svg", LEAF.replace("30mm", "3000mm").replace("20mm", "2000mm"));
+    refused(&desk, &["check", "wall.svg"], 1, &["travel"]);
+    let out = desk.run(&["surfaces", "wall.svg", "--method", "profile"]);
+    assert_eq!(out.status.code(), Some(0), "{}", stderr(&out));
+}
+
+#[test]
 fn surfaces_that_cannot_be_compared_are_refused() {
     let desk = leaf_desk();
     refused(&desk, &["surfaces", "leaf.toml", "--layer", "stem"], 1, &["'stem'", "leaf, blade"]);

@@ -86,7 +86,7 @@ pub(super) fn run(args: &Args) -> Result<(), Stop> {
     let input = inputs::load(path)?;
     let folder = args.out.clone().unwrap_or_else(|| default_folder(path));
     let with_file = |e: CarveError| outcome::with_file(e, &input.artwork_file);
-    let job = input.draft.settle(&input.artwork.found())?;
+    let job = input.draft.without_travel_limits().settle(&input.artwork.found())?;
     let placed = input
         .artwork
         .place(&job.layers, job.artwork_unit_mm, job.artwork_lower_left_mm)

@@ -17,6 +17,8 @@ const MARGIN_NODES: f64 = 3.0;
 /// The crest is measured where the figure is at least this many nodes wide to either side: closer together the grid
 /// itself cuts off more than a hundredth of it.
 const CREST_NODES: f64 = 5.0;
+/// Places at least this part of the largest width count as the widest.
+const WIDE: f64 = 0.9;
 /// Parts less than this many nodes wide get averaged heights.
 const NARROW_NODES: f64 = 3.0;
 /// How exactly widths are found, in nodes.
@@ -35,7 +37,7 @@ pub struct Wanted {
     pub pitch_mm: Option<f64>,
 }
 
-/// Where the cross-sections lie: through the widest place of the artwork.
+/// Where the cross-sections lie: through the middle of the widest place of the artwork.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Cuts {
     /// Row of the grid of the section along x.
@@ -79,13 +81,7 @@ impl Subject {
                 figures.map(|f| Crest::of(f, layer, &grid, job.tolerance.chord_mm)).collect()
             })
             .collect();
-        let mut widest = (0.0, bounds.center());
-        for crest in crests.iter().flatten() {
-            if crest.widest.0 > widest.0 {
-                widest = crest.widest;
-            }
-        }
-        let at = grid.to_grid(widest.1).round();
+        let at = grid.to_grid(widest(&crests).unwrap_or(bounds.center())).round();
         let cuts = Cuts { row: at.y as usize, column: at.x as usize };
         let narrow = |region: &&&Region| {
             let segments = Segments::of_rings(region.rings());
@@ -212,17 +208,27 @@ fn grid_over(bounds: &Bounds, pitch_mm: Option<f64>) -> Result<Grid, CompareErro
     Ok(Grid::covering(bounds.min, around.x, around.y, pitch_mm)?)
 }
 
+/// The middle of the widest places.
+fn widest(crests: &[Vec<Crest>]) -> Option<DVec2> {
+    let places = || crests.iter().flatten().flat_map(|crest| &crest.widths);
+    let most = places().map(|place| place.0).fold(0.0, f64::max);
+    let wide: Vec<DVec2> = places().filter(|p| p.0 >= WIDE * most).map(|p| p.1).collect();
+    let middle = wide.iter().sum::<DVec2>() / wide.len().max(1) as f64;
+    let away = |p: &DVec2| p.distance_squared(middle);
+    wide.into_iter().min_by(|a, b| away(a).total_cmp(&away(b)))
+}
+
 /// The crest that a figure asks for.
 struct Crest {
     points: Vec<(DVec2, f64)>,
-    /// Half of the largest width, and where.
-    widest: (f64, DVec2),
+    /// Half of the width at each point of the spine, and where.
+    widths: Vec<(f64, DVec2)>,
 }
 
 impl Crest {
     /// Over the spine of the ruled surface: one crest for all methods. Outlines without a skeleton have none.
     fn of(figure: &Figure, layer: &LayerSpec, grid: &Grid, chord_mm: f64) -> Self {
-        let mut found = Self { points: Vec::new(), widest: (0.0, DVec2::ZERO) };
+        let mut found = Self { points: Vec::new(), widths: Vec::new() };
         let surface = layer.surface.by("ruled").expect("there is a method of this name");
         let Some(crest) = surface.crest() else { return found };
         let fineness = Fineness::of(grid.pitch_mm, chord_mm);
@@ -235,9 +241,7 @@ impl Crest {
                 if point.half_width >= CREST_NODES * grid.pitch_mm {
                     found.points.push((point.at, height));
                 }
-                if point.half_width > found.widest.0 {
-                    found.widest = (point.half_width, point.at);
-                }
+                found.widths.push((point.half_width, point.at));
             }
         }
         found

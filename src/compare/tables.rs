@@ -9,7 +9,7 @@
 mod creases;
 mod shapes;
 
-pub use creases::{CREASES, Seam, crease};
+pub use creases::{CREASES, SEAMS, Seam, crease, turns};
 pub use shapes::{FINE, Shape, shapes};
 
 use super::measures::{Gauge, Measures};
@@ -151,13 +151,12 @@ impl Raised {
     }
 
     /// A field over it.
-    fn field(&self, shape: &Shape, method: Method) -> Patch {
-        let grid = grid(shape);
-        let window = Window::whole(&grid);
+    fn field(&self, shape: &Shape, method: Method, grid: &Grid) -> Patch {
+        let window = Window::whole(grid);
         let rise = Rise { base_mm: 0.0, height_mm: 1.0 };
         let crest = |way: Way, ridge: &Ridge| {
             let (region, spine) = (&shape.region, &self.skeleton.spine);
-            crest_field(way, region, spine, &ridge.heights(spine), ridge, &grid, &window)
+            crest_field(way, region, spine, &ridge.heights(spine), ridge, grid, &window)
         };
         match method {
             Method::Harmonic => crest(Way::Laplace, &self.ridge),
@@ -167,7 +166,7 @@ impl Raised {
                 crest(Way::Distances, &ridge)
             }
             Method::Scanned(directions, form) => {
-                scan_lines(&shape.region, directions, form, rise, &grid, &window)
+                scan_lines(&shape.region, directions, form, rise, grid, &window)
                     .expect("lines run across every shape")
             }
             Method::RFunction => {
@@ -175,25 +174,25 @@ impl Raised {
                 let mut rings = self.skeleton.sampled.rings().map(<[DVec2]>::to_vec);
                 let outer = rings.next().expect("a shape has an outline");
                 let region = Region { outer, holes: rings.collect() };
-                r_function(&region, 2, 1e-9, Profile::Parabola, rise, &grid, &window)
+                r_function(&region, 2, 1e-9, Profile::Parabola, rise, grid, &window)
             }
-            Method::Profile => bevelled(shape),
+            Method::Profile => bevelled(shape, grid),
             _ => crest(Way::Distances, &self.ridge),
         }
     }
 }
 
 /// The grid that a shape is measured on.
-fn grid(shape: &Shape) -> Grid {
+fn grid(shape: &Shape, cell_mm: f64) -> Grid {
     let bounds = shape.region.bounds();
-    let size = bounds.size() + DVec2::splat(4.0 * CELL);
-    Grid::covering(bounds.min - DVec2::splat(2.0 * CELL), size.x, size.y, CELL)
+    let size = bounds.size() + DVec2::splat(4.0 * cell_mm);
+    Grid::covering(bounds.min - DVec2::splat(2.0 * cell_mm), size.x, size.y, cell_mm)
         .expect("a small grid")
 }
 
-/// A mesh sampled on the grid of its shape.
-fn drawn(shape: &Shape, mesh: &Mesh) -> Patch {
-    rasterise(mesh, &grid(shape)).expect("a small mesh").patch
+/// A mesh sampled on a grid.
+fn drawn(mesh: &Mesh, grid: &Grid) -> Patch {
+    rasterise(mesh, grid).expect("a small mesh").patch
 }
 
 /// A surface of the table.
@@ -364,16 +363,20 @@ pub fn summary(all: &[Shape], outline: Outline, method: Method) -> Summary {
     Summary { figures, faces: raised.iter().map(|r| r.1).sum() }
 }
 
+fn slope_cap_of(method: Method) -> f64 {
+    if method == Method::Capped { 4.0 } else { f64::INFINITY }
+}
+
 /// What one shape raised by a method measures, and its number of triangles.
 fn measured(shape: &Shape, outline: Outline, method: Method) -> (Measures, usize) {
-    let slope_cap = if method == Method::Capped { 4.0 } else { f64::INFINITY };
+    let slope_cap = slope_cap_of(method);
     let join = if method == Method::Literal { Join::Pairs } else { Join::Clusters };
     let raised = Raised::joined(shape, outline, slope_cap, SPACING, join);
+    let grid = grid(shape, CELL);
     let (patch, faces) = match raised.mesh_of(method) {
-        Some(mesh) => (drawn(shape, &mesh), mesh.faces.len()),
-        None => (raised.field(shape, method), 0),
+        Some(mesh) => (drawn(&mesh, &grid), mesh.faces.len()),
+        None => (raised.field(shape, method, &grid), 0),
     };
-    let grid = grid(shape);
     let mut gauge = Gauge::default();
     gauge.add(&patch, &grid, |p| shape.exact.and_then(|exact| exact(p)));
     let crest = raised.skeleton.spine.branches.iter().flat_map(|b| &b.points);
@@ -382,7 +385,7 @@ fn measured(shape: &Shape, outline: Outline, method: Method) -> (Measures, usize
 }
 
 /// The distance profile over a shape, as high as its largest inscribed disc is wide.
-fn bevelled(shape: &Shape) -> Patch {
+fn bevelled(shape: &Shape, grid: &Grid) -> Patch {
     let layer = LayerSpec {
         name: shape.name.to_owned(),
         select: Selector::All,
@@ -399,7 +402,6 @@ fn bevelled(shape: &Shape) -> Patch {
         visible: false,
     };
     let figure = Figure { source: layer.name.clone(), regions: vec![shape.region.clone()] };
-    let grid = grid(shape);
-    let raised = raise(&figure, &layer, &grid, &Tolerance::default()).expect("a sound shape");
-    sampled(raised.surface, &layer, &figure, &grid).expect("a sound surface").0
+    let raised = raise(&figure, &layer, grid, &Tolerance::default()).expect("a sound shape");
+    sampled(raised.surface, &layer, &figure, grid).expect("a sound surface").0
 }

@@ -17,7 +17,7 @@ use super::types::{
     ArtworkSpec, Backdrop, Connectivity, Fit, KeepOut, Machine, Origin, Place, TraceMethod,
     TraceSpec, Wood,
 };
-use crate::geom::{DVec2, Tolerance};
+use crate::geom::{DVec2, DVec3, Tolerance};
 
 /// A checked job in which what hangs on the artwork is still open: sizes, stock, layers.
 #[derive(Debug, Clone, PartialEq)]
@@ -102,6 +102,13 @@ impl Draft {
             .expect("the defaults are complete, and a library can only be added to");
         draft.source = Source::new(file, "");
         draft
+    }
+
+    /// The same on a machine that reaches everywhere: for looking at artwork that is not to be carved as it is.
+    #[must_use]
+    pub fn without_travel_limits(mut self) -> Self {
+        self.machine.travel_mm = DVec3::INFINITY;
+        self
     }
 
     /// Where the artwork comes from and how its size is found.

@@ -48,9 +48,6 @@ impl Look {
 /// its form can still be read; by a factor of 1.8 at most.
 const LEAST_DEPTH: f64 = 0.05;
 
-/// Heights in pictures that are held against each other, multiplied by this for the light.
-const EVEN_LIGHT: f64 = 1.0;
-
 /// The hill-shaded relief as an RGB PNG: one soft sun from the upper left, a sky that leaves hollows
 /// and the foot of walls dark, and soft cast shadows (horizon sweeps over 45 lights, in the manner of
 /// Kennelly and Stewart, 2006).
@@ -104,16 +101,18 @@ pub fn shaded_png(
     canvas.into_png(density)
 }
 
-/// The shaded relief brought to a size in pixels, for sheets with many of them: heights are lit as they are, so that
-/// one can be held against another.
+/// The shaded relief brought to a size in pixels, for sheets with many of them: all are lit as one as high as `highest`
+/// would be, so that one can be held against another.
 pub(super) fn shaded_image(
     field: &Heightfield,
     look: Look,
     size_px: (usize, usize),
+    highest: f32,
 ) -> Result<Image, ReportError> {
     finite_range(field, "shaded picture")?;
     let plane = Plane::sized(field, size_px);
-    Ok(colored(&plane, &lighting(&plane, EVEN_LIGHT), look))
+    let light = lighting(&plane, exaggeration(&plane, 0.0, highest));
+    Ok(colored(&plane, &light, look))
 }
 
 /// By how much heights are multiplied for the light.

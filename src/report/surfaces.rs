@@ -80,7 +80,8 @@ fn significant(figure: f64) -> String {
         f if f >= 100.0 => format!("{f:.0}"),
         f if f >= 10.0 => format!("{f:.1}"),
         f if f >= 1.0 => format!("{f:.2}"),
-        f => format!("{f:.3}"),
+        f if f >= 0.1 => format!("{f:.3}"),
+        f => format!("{f:.4}"),
     }
 }
 

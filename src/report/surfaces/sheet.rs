@@ -24,7 +24,7 @@ use crate::geom::Heightfield;
 /// Longest side of a relief on the sheet, pixels.
 const PICTURE_PX: f32 = 460.0;
 /// The same in a picture of one method.
-const SINGLE_PX: f32 = 300.0;
+const SINGLE_PX: f32 = 270.0;
 /// Height of the sections.
 const SECTION_PX: f32 = 84.0;
 /// Space between things that belong together, and between methods.
@@ -57,7 +57,8 @@ struct Plan {
     /// The relief.
     w: f32,
     h: f32,
-    /// Pixels a millimetre of height in the sections.
+    /// The highest point of all methods, mm, and pixels a millimetre of height in the sections.
+    highest: f32,
     rise: f32,
     /// The cell with all that belongs to it.
     cell_w: f32,
@@ -73,13 +74,15 @@ impl Plan {
         let scale = f64::from(longest_px) / size.max_element();
         let (w, h) = ((size.x * scale) as f32, (size.y * scale) as f32);
         let (w, h) = (w.round().max(2.0), h.round().max(2.0));
-        let highest = shown.compared.iter().filter_map(|c| c.relief.range()).fold(0.0, highest);
+        let ranges = shown.compared.iter().filter_map(|c| c.relief.range());
+        let highest = ranges.fold(0.0, |so_far: f32, (_, high)| so_far.max(high));
         let narrow = longest_px < PICTURE_PX;
         let least = if narrow { 0.0 } else { LEAST_CELL_PX };
         let name = if narrow { 0.6 * NAME_PX } else { NAME_PX };
         Self {
             w,
             h,
+            highest,
             rise: SECTION_PX * 0.94 / highest.max(f32::MIN_POSITIVE),
             cell_w: (w + GAP_PX + SECTION_PX).max(least),
             cell_h: name + h + GAP_PX + SECTION_PX + GAP_PX + LINE_PX * figures as f32,
@@ -87,10 +90,6 @@ impl Plan {
             name,
         }
     }
-}
-
-fn highest(so_far: f32, (_, high): (f32, f32)) -> f32 {
-    so_far.max(high)
 }
 
 /// All methods on one sheet, as an RGB PNG made for upright paper.
@@ -173,9 +172,10 @@ impl Cell<'_> {
     }
 
     fn relief(&mut self, shown: &SideBySide<'_>, compared: &Compared) -> Result<(), ReportError> {
-        let Plan { w, h, name, rise, .. } = self.plan;
+        let Plan { w, h, name, highest, rise, .. } = self.plan;
         let (x, y) = (self.at.0.round(), (self.at.1 + name).round());
-        let image = shaded_image(&compared.relief, Look::Plaster, (w as usize, h as usize))?;
+        let image =
+            shaded_image(&compared.relief, Look::Plaster, (w as usize, h as usize), highest)?;
         self.canvas.lay(&image, x as usize, y as usize);
         self.canvas.frame([x, y, w, h], 1.0, PAPER_LINE);
 
