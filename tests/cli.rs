@@ -674,6 +674,9 @@ fn surfaces_that_cannot_be_compared_are_refused() {
     refused(&desk, &["surfaces", "leaf.svg", "--height", "0"], 2, &["above 0"]);
     refused(&desk, &["surfaces", "leaf.svg", "--figures"], 2, &["--figures"]);
     refused(&desk, &["surfaces", "lost.svg"], 1, &["lost.svg"]);
+    desk.put("surfaces.png", pattern());
+    let over = ["surfaces", "surfaces.png", "--out", ".", "--method", "profile"];
+    refused(&desk, &over, 1, &["overwrite", "--out"]);
     refused(&desk, &["surfaces"], 2, &["INPUT"]);
     refused(&desk, &["surfaces", "--figures", "--method", "butterfly-original"], 2, &["tabled"]);
 }

@@ -101,6 +101,10 @@ pub(super) fn run(args: &Args) -> Result<(), Stop> {
         pitch_mm: args.pitch,
     };
     let subject = Subject::of(&job, &outlines, &wanted)?;
+    let pictures = methods.iter().filter(|_| args.each).map(|method| format!("{method}.png"));
+    let names: Vec<String> =
+        ["surfaces.html", "surfaces.png"].into_iter().map(str::to_owned).chain(pictures).collect();
+    spare_the_input(&input.artwork_file, &folder, &names)?;
     let mut outputs = Outputs::prepare(&folder)?;
 
     let mut compared: Vec<Compared> = Vec::with_capacity(methods.len());
@@ -149,6 +153,19 @@ pub(super) fn run(args: &Args) -> Result<(), Stop> {
     }
     if args.timings {
         observe::complain(&timings);
+    }
+    Ok(())
+}
+
+/// No picture must take the place of the artwork that it shows.
+fn spare_the_input(artwork: &Path, folder: &Path, names: &[String]) -> anyhow::Result<()> {
+    let Ok(artwork_file) = artwork.canonicalize() else { return Ok(()) };
+    let same = |name: &String| folder.join(name).canonicalize().is_ok_and(|p| p == artwork_file);
+    if names.iter().any(same) {
+        anyhow::bail!(
+            "the outputs would overwrite {}; choose another folder with --out",
+            artwork.display()
+        );
     }
     Ok(())
 }
