@@ -108,6 +108,15 @@ impl Block {
         self.cut_alone(profile, moves, |_| false)
     }
 
+    /// True where a move by itself would remove nothing of the wood as it is.
+    pub fn is_clear_of(&self, profile: &Profile, mv: &Move) -> bool {
+        let radius_mm = profile.radius_mm() + 0.5 * mv.from.truncate().distance(mv.to.truncate());
+        let middle = mv.from.midpoint(mv.to).truncate();
+        let Some(field) = self.field.near(middle, radius_mm) else { return true };
+        let mut part = Self { field, top_mm: self.top_mm, thickness_mm: self.thickness_mm };
+        part.cut(profile, std::slice::from_ref(mv))[0].deepest_mm == 0.0
+    }
+
     /// As [`Block::cut`]; the moves that `alone` names (by index) are credited with all the wood that
     /// they meet themselves. That is several times slower for short moves.
     pub fn cut_alone(

@@ -391,3 +391,24 @@ fn a_retract_from_the_end_of_a_cut_meets_no_wood() {
         assert_eq!(met[1], Contact::default(), "{end}");
     }
 }
+
+proptest! {
+    /// A move is clear of wood exactly where cutting with it alone would remove nothing.
+    #[test]
+    fn a_move_is_clear_where_it_alone_removes_nothing(
+        hills in prop::collection::vec(-3.0f32..0.0, 30 * 30),
+        ends in prop::array::uniform2((0.5f64..5.5, 0.5f64..5.5, -2.5f64..0.5)),
+        ball: bool,
+    ) {
+        let grid = Grid { nx: 30, ny: 30, pitch_mm: 0.2, origin: DVec2::ZERO };
+        let field = Heightfield::from_z(grid, hills);
+        let [from, to] = ends.map(|(x, y, z)| DVec3::new(x, y, z));
+        let mv = Move { from, to, kind: MoveKind::Feed { feed_mm_per_min: 600.0 }, line: 0 };
+        let profile = if ball { Profile::Ball { radius_mm: 0.7 } } else { Profile::Flat { radius_mm: 0.7 } };
+        let mut block = Block::from_field(&stock(), field);
+        let is_clear = block.is_clear_of(&profile, &mv);
+        let before = block.field().clone();
+        block.cut(&profile, &[mv]);
+        prop_assert_eq!(is_clear, block.field() == &before);
+    }
+}

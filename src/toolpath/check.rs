@@ -123,9 +123,9 @@ const GRID_MM: f64 = 0.0011;
 impl Toolpath {
     /// Checks the laws of every toolpath: moves are continuous and finite, start and end at safe Z, stay above the
     /// stock's rectangle and within the machine's travel; rapids are vertical, level or at safe Z; feeds are
-    /// positive and go down no faster than the plunge limit of the operations that use this cutter, except straight down
-    /// from a rapid to below the top of the stock, at the feed of those operations: a descent in a hollow carved before
-    /// (that it meets no wood is for the dry run to prove); arcs are made of feed moves at one speed, one after the other.
+    /// positive and go down no faster than the plunge limit of the operations that use this cutter or, to below the top of
+    /// the stock, their feed: ways down in hollows carved before (that those faster than the plunge limit meet no wood is
+    /// for the dry run to prove); arcs are made of feed moves at one speed, one after the other.
     ///
     /// # Errors
     /// The first [`PathFault`] found.
@@ -164,11 +164,7 @@ impl Toolpath {
             if m.from != at {
                 return Err(PathFault::Gap { name: name(), index, gap_mm: m.from.distance(at) });
             }
-            let is_descent = index > 0
-                && self.moves[index - 1].is_rapid()
-                && m.from.truncate() == m.to.truncate()
-                && m.to.z < 0.0;
-            self.check_move(job, index, m, if is_descent { descent } else { plunge })?;
+            self.check_move(job, index, m, if m.to.z < 0.0 { descent } else { plunge })?;
             at = m.to;
             (low, high) = (low.min(at), high.max(at));
         }

@@ -11,6 +11,7 @@ use crate::geom::{DVec2, DVec3, Move, MoveKind};
 use crate::job::{Job, Machine, Operation, OperationKind};
 use crate::offset::Dropper;
 use crate::stock::{Block, Contact};
+use rayon::prelude::*;
 use std::collections::VecDeque;
 
 /// A feed is set by the wood that is met within this distance before and after, mm.
@@ -141,13 +142,23 @@ impl<'a> Emitter<'a> {
         let fitter = Fitter::new(self.operation, self.job);
         let first_arc = self.arcs.len();
         fitter.fit(&passes, free, &mut self.moves, &mut self.arcs);
+        // Before the passes, so that what a way down meets is not credited to the passes beside it.
+        let is_clear = |m: &Move| is_held_back(m, self.operation) && block.is_clear_of(profile, m);
+        let clear: Vec<bool> = self.moves[first..].par_iter().map(is_clear).collect();
         let contacts = block.cut(profile, &self.moves[first..]);
-        self.settle_feeds(first, first_arc, &contacts);
+        self.settle_feeds(first, first_arc, &contacts, &clear);
     }
 
     /// Sets the feeds of the moves from `first` on by the wood that they take (`contacts`, one for each), looking a little
-    /// ahead and back: where it is little the cutter goes faster, where it is deep slower. An arc has one feed.
-    fn settle_feeds(&mut self, first: usize, first_arc: usize, contacts: &[Contact]) {
+    /// ahead and back: where it is little the cutter goes faster, where it is deep slower. The plunge limit does not hold for
+    /// ways down over carved ground that are `clear` of wood. An arc has one feed.
+    fn settle_feeds(
+        &mut self,
+        first: usize,
+        first_arc: usize,
+        contacts: &[Contact],
+        clear: &[bool],
+    ) {
         let moves = &self.moves[first..];
         let thickest = most_nearby(moves, |k| f64::from(contacts[k].deepest_mm));
         let chips = most_nearby(moves, |k| f64::from(contacts[k].chip));
@@ -160,13 +171,11 @@ impl<'a> Emitter<'a> {
                 feed(m.to - m.from, most, self.operation, &self.job.machine)
             });
         let mut speeds: Vec<f64> = speeds.collect();
-        for k in 1..moves.len() {
-            let (before, m) = (&moves[k - 1], &moves[k]);
-            // The way down to a ramp, in a hollow that was carved before: its depth is known, and it meets nothing.
-            let is_straight_down = m.from.truncate() == m.to.truncate() && m.to.z < m.from.z;
-            let is_descent = before.is_rapid() && is_straight_down && m.to.z < -CARVED_MM;
-            if is_descent && contacts[k].deepest_mm == 0.0 {
-                speeds[k] = base.min(self.job.machine.max_rate_mm_per_min.z);
+        for (k, m) in moves.iter().enumerate() {
+            if clear[k] && m.to.z < -CARVED_MM {
+                let way = m.to - m.from;
+                let speed = feed_in_air(way, base, self.operation, &self.job.machine);
+                speeds[k] = speeds[k].max(speed);
             }
         }
         for arc in &self.arcs[first_arc..] {
@@ -195,6 +204,12 @@ impl<'a> Emitter<'a> {
         }
         to
     }
+}
+
+/// True for a way down that the plunge limit slows.
+fn is_held_back(m: &Move, operation: &Operation) -> bool {
+    let down = m.from.z - m.to.z;
+    !m.is_rapid() && operation.plunge_mm_per_min * m.length_mm() < operation.feed_mm_per_min * down
 }
 
 /// Height of the tip at which a cutter that comes straight down over a point touches the wood, mm.
@@ -238,15 +253,22 @@ pub(super) fn feed(
     operation: &Operation,
     machine: &Machine,
 ) -> f64 {
+    let most_mm_per_min = if way.z < 0.0 {
+        most_mm_per_min.min(operation.plunge_mm_per_min * way.length() / -way.z)
+    } else {
+        most_mm_per_min
+    };
+    feed_in_air(way, most_mm_per_min, operation, machine)
+}
+
+/// As [`feed`], for a way that meets no wood: the plunge limit does not hold.
+fn feed_in_air(way: DVec3, most_mm_per_min: f64, operation: &Operation, machine: &Machine) -> f64 {
     let length = way.length();
     let mut most = most_mm_per_min;
     for axis in 0..3 {
         if way[axis] != 0.0 {
             most = most.min(machine.max_rate_mm_per_min[axis] * length / way[axis].abs());
         }
-    }
-    if way.z < 0.0 {
-        most = most.min(operation.plunge_mm_per_min * length / -way.z);
     }
     if most == operation.feed_mm_per_min {
         return most;

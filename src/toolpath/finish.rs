@@ -1,16 +1,18 @@
-//! Finishing to a scallop height whatever the slope: waterlines on steep ground, passes over the rest, then more wherever
-//! those left too much.
+//! Finishing to a scallop height whatever the slope: waterlines on steep ground, passes over the rest, along creases, then
+//! more wherever those left too much.
 //!
 //! Passes a distance s apart in plan lie `s / sqrt(1 - (N n)^2)` apart on the surface, N its normal and n the
 //! horizontal direction across the passes: cusps grow by `1 / cos^2` of a slope that falls across them. So ground on
 //! which they could grow beyond the limit is cut along its contours first, where the cutter neither climbs nor has to go
 //! down at its plunge limit. A hollow along a pass may be missed by half a stepover. For two directions at right angles
 //! the smaller (N n)^2 is 1/2 at most, so passes of `s / sqrt 2` in the better direction hold the scallop on every slope,
-//! walls included. Which places want them is not guessed from slopes but measured on the wood that the passes before
-//! have left.
+//! walls included. But most of what the first passes leave lies in creases, where one pass along does more than many
+//! short ones across: these come first. Which places want them is not guessed from slopes but measured on the wood that
+//! the passes before have left.
 
 use super::emit::Emitter;
 use super::left::Surfaces;
+use super::pencil::pencil;
 use super::quicker::outlines_are_quicker;
 use super::raster::{First, Passes, clear_deep_wood, passes, passes_where_wood_is_left};
 use super::trace::LEAST_ROUNDING_MM;
@@ -80,6 +82,12 @@ pub(super) fn finish(
     out.note_deep_pass(deepest_mm);
     let reach = closing(&tip, &rolled);
     let stepover_mm = FRAC_1_SQRT_2 * stepover_mm;
+    let left = |block: &Block| {
+        let surfaces = Surfaces { tip: &tip, reach: &reach, wood: block.field() };
+        surfaces.left(limit_mm, &profile, stepover_mm)
+    };
+    let Some(creases) = left(block) else { return Ok(()) };
+    pencil(site, &creases, first.stepover_mm, block, out);
     let lines = Waterlines {
         tip: &tip,
         reach: &reach,
@@ -89,8 +97,7 @@ pub(super) fn finish(
     };
     waterlines(site, &lines, block, out);
     for (turn, closer) in TURNS {
-        let surfaces = Surfaces { tip: &tip, reach: &reach, wood: block.field() };
-        let Some(left) = surfaces.left(limit_mm, &profile, stepover_mm) else { break };
+        let Some(left) = left(block) else { break };
         let (stepover_mm, angle_rad) = (closer * stepover_mm, angle_rad + turn);
         let across = Passes { stepover_mm, angle_rad, only: Some(&left) };
         passes(site, &across, block, out)?;

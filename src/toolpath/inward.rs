@@ -17,7 +17,7 @@ use super::fit::fit;
 use super::left::Left;
 use super::order::Direction;
 use super::pocket::{begun_at, is_closed, nearest_vertex};
-use super::raster::{TOP_MM, deepest_pass_mm, link, points};
+use super::raster::{TOP_MM, deepest_pass_mm, joined, points};
 use super::rows::{Row, rim};
 use super::trace::{LEAST_ROUNDING_MM, Sample, Tracer};
 use super::travel::Travel;
@@ -68,17 +68,8 @@ pub(super) fn inward(
     let spans = vec![spans];
     let deepest_mm = deepest_pass_mm(&spans, block, site.operation.cutter.working_mm());
     let travel = Travel::new(site.job, site.operation, block);
-    let mut chains: Vec<Vec<DVec3>> = Vec::new();
-    for span in nearest_first(spans.into_iter().flatten().collect()) {
-        if let Some(chain) = chains.last_mut()
-            && let Some(way) = link(site, &travel, &tracer, chain, &span)
-        {
-            chain.extend(way);
-            chain.extend(span);
-        } else {
-            chains.push(span);
-        }
-    }
+    let spans = nearest_first(spans.into_iter().flatten().collect());
+    let chains = joined(site, &travel, &tracer, spans);
     out.passes(chains, Direction::Both, &profile, block);
     Ok(deepest_mm)
 }
@@ -119,48 +110,47 @@ impl Inward<'_> {
             Some(only) => runs_with(curve, |p| only.cap_mm(p) > f64::NEG_INFINITY),
         };
         let plans = runs.iter().flat_map(|run| chords(run, PLAN_FIT * self.stepover_mm, |_| true));
-        plans.flat_map(|plan| self.on_target(site, &plan, tracer)).collect()
+        plans.flat_map(|plan| along(site, self.only, &plan, tracer)).collect()
     }
+}
 
-    /// A way in plan on the target: the stretches that are low enough.
-    fn on_target(
-        &self,
-        site: &Site,
-        plan: &[DVec2],
-        tracer: &Tracer<impl Fn(DVec2) -> f64>,
-    ) -> Vec<Span> {
-        let mut spans: Vec<Span> = Vec::new();
-        let mut goes_on = false;
-        for way in plan.windows(2) {
-            let row = Row { from: way[0], to: way[1] };
-            let along = (row.to - row.from).normalize_or_zero();
-            let cap =
-                |p: &Sample| self.only.map_or(TOP_MM, |only| only.cap_mm(row.from + along * p.s));
-            let wanted = |p: &Sample| p.z <= cap(p).min(TOP_MM);
-            let path = tracer.trace(row.from, row.to);
-            let mut k = 0;
-            for run in path.chunk_by(|a, b| wanted(a) == wanted(b)) {
-                let is_first = k == 0;
-                k += run.len();
-                if run.len() < 2 || !wanted(&run[0]) {
-                    goes_on = false;
-                    continue;
-                }
-                let piece = points(&row, &fit(run, site.job.tolerance.fit_mm));
-                match spans.last_mut() {
-                    Some(span) if is_first && goes_on => span.extend(&piece[1..]),
-                    _ => spans.push(piece),
-                }
-                goes_on = k == path.len();
+/// A way in plan on the target: the stretches that are low enough, and where `only` wants them.
+pub(super) fn along(
+    site: &Site,
+    only: Option<&Left>,
+    plan: &[DVec2],
+    tracer: &Tracer<impl Fn(DVec2) -> f64>,
+) -> Vec<Span> {
+    let mut spans: Vec<Span> = Vec::new();
+    let mut goes_on = false;
+    for way in plan.windows(2) {
+        let row = Row { from: way[0], to: way[1] };
+        let along = (row.to - row.from).normalize_or_zero();
+        let cap = |p: &Sample| only.map_or(TOP_MM, |only| only.cap_mm(row.from + along * p.s));
+        let wanted = |p: &Sample| p.z <= cap(p).min(TOP_MM);
+        let path = tracer.trace(row.from, row.to);
+        let mut k = 0;
+        for run in path.chunk_by(|a, b| wanted(a) == wanted(b)) {
+            let is_first = k == 0;
+            k += run.len();
+            if run.len() < 2 || !wanted(&run[0]) {
+                goes_on = false;
+                continue;
             }
+            let piece = points(&row, &fit(run, site.job.tolerance.fit_mm));
+            match spans.last_mut() {
+                Some(span) if is_first && goes_on => span.extend(&piece[1..]),
+                _ => spans.push(piece),
+            }
+            goes_on = k == path.len();
         }
-        spans
     }
+    spans
 }
 
 /// The spans in an order in which the nearest to the end of the one before comes next, begun where that is nearest: a
 /// closed one anywhere, an open one at either end.
-fn nearest_first(spans: Vec<Span>) -> Vec<Span> {
+pub(super) fn nearest_first(spans: Vec<Span>) -> Vec<Span> {
     let plan = |span: &Span| -> Vec<DVec2> { span.iter().map(|p| p.truncate()).collect() };
     let pass = |span: Span| {
         let mut bounds = Bounds::EMPTY;

@@ -49,6 +49,8 @@ pub(super) fn todo(site: &Site, limit_mm: f64, stepover_mm: f64, wood: &Heightfi
 /// Where the cutter's axis has to pass to take away what is left.
 pub(super) struct Left {
     grid: Grid,
+    /// The nodes that the axis should pass by, in their order.
+    axes: Vec<usize>,
     /// By node: how high the tip may go there; -inf where it is not wanted.
     cap_mm: Vec<f32>,
 }
@@ -58,24 +60,25 @@ impl Surfaces<'_> {
     /// is none.
     pub(super) fn left(&self, limit_mm: f64, profile: &Profile, stepover_mm: f64) -> Option<Left> {
         let grid = *self.reach.grid();
-        let cutter = Disc::new(profile, grid.pitch_mm);
-        let found: Vec<Vec<usize>> = (0..grid.ny)
+        let cutter = &Disc::new(profile, grid.pitch_mm);
+        let mut axes: Vec<usize> = (0..grid.ny)
             .into_par_iter()
-            .map(|j| {
-                let axis = |i| self.axis_for(i, j, limit_mm, &cutter);
-                (0..grid.nx).filter_map(axis).collect()
+            .flat_map_iter(|j| {
+                (0..grid.nx).filter_map(move |i| self.axis_for(i, j, limit_mm, cutter))
             })
             .collect();
-        if found.iter().all(Vec::is_empty) {
+        if axes.is_empty() {
             return None;
         }
+        axes.sort_unstable();
+        axes.dedup();
         let mut cap_mm = vec![f32::NEG_INFINITY; grid.len()];
-        for k in found.into_iter().flatten() {
+        for &k in &axes {
             cap_mm[k] = self.tip.z()[k] + (CLIMB * stepover_mm) as f32;
         }
         // A place is as good as the node there, at most half a diagonal away.
         let near = 0.5 * stepover_mm / grid.pitch_mm + HALF_DIAGONAL;
-        Some(Left { grid, cap_mm: grown(&cap_mm, grid.nx, near) })
+        Some(Left { grid, axes, cap_mm: grown(&cap_mm, grid.nx, near) })
     }
 
     /// True when the surface that can be reached comes within `limit_mm` of a point above node (i, j).
@@ -156,6 +159,11 @@ impl Disc {
 }
 
 impl Left {
+    /// The nodes that the axis should pass by, in their order.
+    pub(super) fn axes(&self) -> &[usize] {
+        &self.axes
+    }
+
     /// True where the tip may pass.
     pub(super) fn is_wanted(&self, node: usize) -> bool {
         self.cap_mm[node] > f32::NEG_INFINITY

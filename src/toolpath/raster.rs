@@ -190,6 +190,27 @@ pub(super) fn link(
     (seconds(&way) <= lift).then(|| way[1..way.len() - 1].to_vec())
 }
 
+/// Spans in their order as chains: joined wherever a link is quicker than lifting.
+pub(super) fn joined(
+    site: &Site,
+    travel: &Travel,
+    tracer: &Tracer<impl Fn(DVec2) -> f64>,
+    spans: Vec<Span>,
+) -> Vec<Vec<DVec3>> {
+    let mut chains: Vec<Vec<DVec3>> = Vec::new();
+    for span in spans {
+        if let Some(chain) = chains.last_mut()
+            && let Some(way) = link(site, travel, tracer, chain, &span)
+        {
+            chain.extend(way);
+            chain.extend(span);
+        } else {
+            chains.push(span);
+        }
+    }
+    chains
+}
+
 /// The spans of a row with something to cut. Where only some places are asked for, nothing else is computed.
 fn row_spans(
     site: &Site,

@@ -675,7 +675,7 @@ fn broken_paths_are_found_out() {
     }
     assert!(matches!(broken(&|m| m[down].kind = feed(5000.0)), PathFault::Plunge { .. }));
     assert!(matches!(broken(&|m| m[down].kind = feed(0.0)), PathFault::BadFeed { .. }));
-    // Straight down after a rapid, the operation's feed is allowed in a hollow, not at the top of the stock.
+    // Down into a hollow the operation's feed is allowed, not to the top of the stock.
     let (fast, plunge) = (job.operations[0].feed_mm_per_min, job.operations[0].plunge_mm_per_min);
     assert!(good.moves[down - 1].is_rapid() && fast > plunge);
     let descent = |end: f64, speed: f64| {
