@@ -11,6 +11,7 @@
 mod arcs;
 mod chain;
 mod check;
+mod clearing;
 mod contours;
 mod emit;
 mod finish;
@@ -41,13 +42,12 @@ pub use arcs::Arc;
 pub use check::PathFault;
 
 use crate::geom::{Heightfield, Move, MoveKind};
-use crate::job::{CutterSpec, Follow, Job, Operation, OperationKind, Pattern};
+use crate::job::{CutterSpec, Follow, Job, Operation, OperationKind};
 use crate::relief::Grounds;
 use crate::stock::Block;
+use clearing::Clearing;
 use emit::Emitter;
 use finish::Finish;
-use pocket::Pockets;
-use rough::Rough;
 use waterline::Contour;
 
 /// The moves of one program: one cutter, one or more operations.
@@ -147,9 +147,6 @@ pub enum ToolpathError {
     Fault(#[from] PathFault),
 }
 
-/// Shortest span of a roughing pass, as a fraction of the cutter's diameter.
-const SHORTEST_SPAN_PER_DIAMETER: f64 = 0.3;
-
 /// Most points that one operation may compute.
 const MOST_SAMPLES: f64 = 1e8;
 
@@ -243,29 +240,9 @@ fn plan_from(
         match operation.kind {
             OperationKind::Rough { leave_mm, stepdown_mm, stepover_mm, pattern } => {
                 let only_deeper_than_mm = terrace_mm(&job.operations[..index]);
-                match pattern {
-                    Pattern::Contour { milling } => {
-                        let cut = Pockets {
-                            leave_mm,
-                            stepdown_mm,
-                            stepover_mm,
-                            milling,
-                            only_deeper_than_mm,
-                        };
-                        pocket::pockets(&site, &cut, block, &mut out)?;
-                    }
-                    Pattern::Raster { angle_rad } => {
-                        let cut = Rough {
-                            leave_mm,
-                            stepdown_mm,
-                            stepover_mm,
-                            angle_rad,
-                            only_deeper_than_mm,
-                            shortest_mm: SHORTEST_SPAN_PER_DIAMETER * operation.cutter.diameter_mm,
-                        };
-                        rough::rough(&site, &cut, block, &mut out)?;
-                    }
-                }
+                let clearing =
+                    Clearing { leave_mm, stepdown_mm, stepover_mm, only_deeper_than_mm, pattern };
+                clearing.clear(&site, block, &mut out)?;
             }
             OperationKind::Raster { stepover, angle_rad } => {
                 raster::raster(&site, stepover, angle_rad, block, &mut out)?;

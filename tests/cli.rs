@@ -196,7 +196,8 @@ fn the_same_bytes_with_one_and_two_threads() {
 #[test]
 fn artwork_alone_is_carved_with_defaults() {
     let desk = Desk::new();
-    let svg = LEAF.replace("30mm", "30").replace("20mm", "20");
+    // No unit, and slim, so that it is soon carved at the default width.
+    let svg = LEAF.replace("30mm", "30").replace("20mm", "4").replace("0 0 30 20", "0 0 150 20");
     desk.put("leaf.svg", svg);
     desk.put("small.toml", ""); // an unrelated file beside it
     let out = desk.run(&["carve", "leaf.svg", "--out", "made"]);
@@ -247,25 +248,25 @@ fn png(w: u32, h: u32, color: &dyn Fn(f64, f64) -> [u8; 3]) -> Vec<u8> {
     bytes
 }
 
-/// A green disc with a yellow one in it, on white.
-fn disc(x: f64, y: f64) -> [u8; 3] {
-    match libm::hypot(x - 60.0, y - 50.0) {
-        r if r < 15.0 => [240, 200, 40],
-        r if r < 40.0 => [40, 127, 63],
+/// A green bar with round ends and a yellow one in it, on white. Slim, so that it is soon carved at the default width.
+fn bar(x: f64, y: f64) -> [u8; 3] {
+    match libm::hypot(((x - 60.0).abs() - 45.0).max(0.0), y - 12.5) {
+        r if r < 4.0 => [240, 200, 40],
+        r if r < 10.0 => [40, 127, 63],
         _ => [255, 255, 255],
     }
 }
 
 fn pattern() -> Vec<u8> {
-    png(120, 100, &disc)
+    png(120, 25, &bar)
 }
 
 /// The palette of [`pattern`], counted pixel by pixel.
 fn palette() -> [String; 3] {
     let all: Vec<[u8; 3]> =
-        (0..12_000).map(|k| disc(f64::from(k % 120) + 0.5, f64::from(k / 120) + 0.5)).collect();
+        (0..3_000).map(|k| bar(f64::from(k % 120) + 0.5, f64::from(k / 120) + 0.5)).collect();
     let swatch = |color: [u8; 3], name: &str| {
-        let share = all.iter().filter(|c| **c == color).count() as f64 / 120.0;
+        let share = all.iter().filter(|c| **c == color).count() as f64 / 30.0;
         let [r, g, b] = color;
         format!("#{r:02x}{g:02x}{b:02x} {name} {share:.1} %")
     };

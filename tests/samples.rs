@@ -1,4 +1,5 @@
-//! Every sample is complete and carves. With `RELIEVO_SAMPLES=full` at its own pitch, otherwise at a coarse one.
+//! Every sample is complete and carves. With `RELIEVO_SAMPLES=full` at its own pitch and scallop height, otherwise at coarse
+//! ones.
 #![allow(clippy::unwrap_used, reason = "a test: what cannot be read should stop it")]
 
 use std::path::{Path, PathBuf};
@@ -50,9 +51,14 @@ fn carve_with(sample: &Path, methods: &[&str]) {
         job = lines.join("\n") + "\n";
     }
     if std::env::var_os("RELIEVO_SAMPLES").is_none_or(|v| v != "full") {
-        let at = job.find("pitch_mm = ").expect("a sample says its pitch");
-        let end = at + job[at..].find('\n').unwrap();
-        job.replace_range(at..end, "pitch_mm = 0.4");
+        for (key, coarse) in [("pitch_mm = ", "0.4"), ("scallop_mm = ", "0.05")] {
+            let change = |line: &str| match line.strip_prefix(key) {
+                Some(_) => format!("{key}{coarse}"),
+                None => line.to_owned(),
+            };
+            assert!(job.lines().any(|line| line.starts_with(key)), "{name} says no {key}");
+            job = job.lines().map(change).collect::<Vec<_>>().join("\n") + "\n";
+        }
     }
     std::fs::write(desk.path().join("job.toml"), job).unwrap();
     let artwork = artwork(sample);

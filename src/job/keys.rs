@@ -175,7 +175,7 @@ pub(super) const JOINS: &[&str] = &["clusters", "pairs"];
 /// Kinds of operation that there are.
 pub(super) const OPERATIONS: &[&str] = &["rough", "finish", "raster", "contour"];
 /// Ways of [`super::Pattern`], in its order.
-pub(super) const PATTERNS: &[&str] = &["contour", "raster"];
+pub(super) const PATTERNS: &[&str] = &["contour", "raster", "quicker"];
 /// Names of [`super::TraceMethod`], in its order.
 pub(super) const TRACE_METHODS: &[&str] = &["auto", "crack", "moore", "grey"];
 /// Names of [`super::Milling`], in its order.
@@ -787,8 +787,9 @@ pub(super) static OPERATION: Section = Section {
         key(
             "pattern",
             Kind::Choice(PATTERNS),
-            Text("contour"),
-            "rough: rings that keep their distance from the walls (contour), or parallel passes (raster)",
+            Text("quicker"),
+            "rough: rings that keep their distance from the walls (contour), parallel passes (raster), or what is quicker; \
+             contour where milling is given",
         ),
         key(
             "follow",

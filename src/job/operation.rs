@@ -81,11 +81,13 @@ pub(super) fn read_operation(
         Some(_) => KindDraft::Contour,
         None => return Err(table.unknown_word("kind", "kind of operation", word, OPERATIONS)),
     };
+    let pattern = pattern(table);
     let foreign: &[&str] = match kind {
-        KindDraft::Rough if table.choice("pattern") == 0 => {
-            &["scallop_mm", "steeper_than_deg", "follow", "angle_deg"]
-        }
-        KindDraft::Rough => &["scallop_mm", "steeper_than_deg", "follow", "milling"],
+        KindDraft::Rough => match PATTERNS[pattern] {
+            "contour" => &["scallop_mm", "steeper_than_deg", "follow", "angle_deg"],
+            "raster" => &["scallop_mm", "steeper_than_deg", "follow", "milling"],
+            _ => &["scallop_mm", "steeper_than_deg", "follow"],
+        },
         KindDraft::Finish => {
             &["leave_mm", "stepdown_mm", "stepover_mm", "pattern", "milling", "steeper_than_deg"]
         }
@@ -99,7 +101,7 @@ pub(super) fn read_operation(
     if let Some(name) = foreign.iter().find(|name| table.raw(name).is_some()) {
         let whose = match kind {
             KindDraft::Rough => {
-                format!("{word} operation in {} passes", PATTERNS[table.choice("pattern")])
+                format!("{word} operation in {} passes", PATTERNS[pattern])
             }
             _ => format!("{word} operation"),
         };
@@ -136,6 +138,12 @@ pub(super) fn read_operation(
     Ok(draft)
 }
 
+/// Index of the word of [`PATTERNS`]. Rows meet the wood on both sides: who asks for one side asks for rings.
+fn pattern(table: &Table<'_>) -> usize {
+    let asks_for_rings = table.raw("pattern").is_none() && table.raw("milling").is_some();
+    if asks_for_rings { 0 } else { table.choice("pattern") }
+}
+
 fn operation(
     table: &Table<'_>,
     kind: KindDraft,
@@ -152,7 +160,7 @@ fn operation(
         stepdown_mm: table.number("stepdown_mm"),
         stepover_mm: table.number("stepover_mm"),
         scallop_mm: table.number("scallop_mm"),
-        pattern: table.choice("pattern"),
+        pattern: pattern(table),
         follow: [Follow::Quicker, Follow::Direction, Follow::Outlines][table.choice("follow")],
         milling: [Milling::Climb, Milling::Conventional][table.choice("milling")],
         steeper_than_rad: table.sure_number("steeper_than_deg").to_radians(),
@@ -353,7 +361,7 @@ impl Step<'_> {
             return self.refuse(&["stepover_mm"], &message, &format!("give {diameter} or less"));
         }
         let widest = rule::RING_STEPOVER * diameter;
-        let rings = draft.kind == KindDraft::Rough && PATTERNS[draft.pattern] == "contour";
+        let rings = draft.kind == KindDraft::Rough && PATTERNS[draft.pattern] != "raster";
         if rings && draft.stepover_mm.is_some_and(|stepover| stepover > widest) {
             let message = format!("rings further apart than {widest:.3} mm leave ribs in corners");
             let help = "give less, or pattern = \"raster\"";
@@ -370,8 +378,9 @@ impl Step<'_> {
                     None => round(rule::ROUGH_STEPOVER * draft.cutter.working_mm()),
                 },
                 pattern: match PATTERNS[draft.pattern] {
+                    "contour" => Pattern::Contour { milling: draft.milling },
                     "raster" => Pattern::Raster { angle_rad },
-                    _ => Pattern::Contour { milling: draft.milling },
+                    _ => Pattern::Quicker { milling: draft.milling, angle_rad },
                 },
             },
             KindDraft::Contour => OperationKind::Contour {

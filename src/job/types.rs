@@ -557,6 +557,13 @@ pub enum Pattern {
         /// Direction of the passes from the x axis, radians.
         angle_rad: f64,
     },
+    /// Rings, or passes where those are much quicker.
+    Quicker {
+        /// Side of the wood in rings.
+        milling: Milling,
+        /// Direction of the passes from the x axis, radians.
+        angle_rad: f64,
+    },
 }
 
 /// What the first passes of finishing follow.

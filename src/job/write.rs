@@ -442,9 +442,14 @@ fn operation_lines(operation: &Operation) -> Vec<Line> {
                 ("stepover_mm", number(stepover_mm)),
             ];
             lines.extend(match pattern {
-                Pattern::Contour { milling } => [("pattern", quoted(PATTERNS[0])), side(milling)],
+                Pattern::Contour { milling } => {
+                    vec![("pattern", quoted(PATTERNS[0])), side(milling)]
+                }
                 Pattern::Raster { angle_rad } => {
-                    [("pattern", quoted(PATTERNS[1])), angle(angle_rad)]
+                    vec![("pattern", quoted(PATTERNS[1])), angle(angle_rad)]
+                }
+                Pattern::Quicker { milling, angle_rad } => {
+                    vec![("pattern", quoted(PATTERNS[2])), side(milling), angle(angle_rad)]
                 }
             });
             ("rough", lines)

@@ -71,20 +71,24 @@ impl Mask {
         depth
     }
 
-    /// The middle lines of the patches, each from an end or a fork to the next, or round, or a single node; not those
-    /// where a patch is more than `deepest` steps deep, and from forks none of fewer than `shortest` nodes.
+    /// The middle lines of the patches, each from an end or a fork to the next, or round, or a single node; of those
+    /// where a patch is more than `deepest` steps deep, and of those from forks, only stretches of at least `shortest`
+    /// nodes.
     pub(super) fn middle_lines(mut self, deepest: u8, shortest: usize) -> Vec<Vec<usize>> {
         let depth = self.depths();
         self.thin(&depth);
-        for (set, &depth) in self.set.iter_mut().zip(&depth) {
-            *set &= depth <= deepest;
-        }
+        let is_thin = |node: usize| depth[node] <= deepest;
         let is_fork = |node: usize| self.next(node).count() > 2;
-        let mut lines = self.lines();
-        lines.retain(|line| {
-            line.len() >= shortest || !(is_fork(line[0]) || is_fork(line[line.len() - 1]))
-        });
-        lines
+        let parts = |line: Vec<usize>| -> Vec<Vec<usize>> {
+            let is_free = !(is_fork(line[0]) || is_fork(line[line.len() - 1]));
+            if is_free && line.iter().all(|&node| is_thin(node)) {
+                return vec![line];
+            }
+            let parts = line.chunk_by(|&a, &b| is_thin(a) == is_thin(b));
+            let kept = parts.filter(|part| is_thin(part[0]) && part.len() >= shortest);
+            kept.map(<[usize]>::to_vec).collect()
+        };
+        self.lines().into_iter().flat_map(parts).collect()
     }
 
     /// The set neighbours of a node.
@@ -255,7 +259,11 @@ mod tests {
         let row: Vec<usize> = (4..20).map(|i| 8 * NX + i).collect();
         let lines = Mask::around(&row, 1.5, NX, NY).middle_lines(2, 3);
         assert_eq!(lines.len(), 1);
-        assert!(lines[0].iter().all(|k| k / NX == 8) && lines[0].len() >= 14, "{lines:?}");
+        // Its ends may be in the corners of the band.
+        let (inner, ends) =
+            (&lines[0][1..lines[0].len() - 1], [lines[0][0], lines[0][lines[0].len() - 1]]);
+        assert!(inner.iter().all(|k| k / NX == 8) && inner.len() >= 14, "{lines:?}");
+        assert!(ends.iter().all(|k| (k / NX).abs_diff(8) <= 1), "{lines:?}");
         let square: Vec<usize> = (0..49).map(|k| (4 + k / 7) * NX + 6 + k % 7).collect();
         assert!(Mask::around(&square, 1.5, NX, NY).middle_lines(2, 3).is_empty());
     }
