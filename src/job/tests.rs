@@ -154,7 +154,7 @@ fn the_whole_example_is_read() {
         leave_mm: 0.7,
         stepdown_mm: 1.5,
         stepover_mm: 2.4,
-        pattern: Pattern::Contour { milling: Milling::Climb },
+        pattern: Pattern::Quicker { milling: Milling::Climb, angle_rad: job.stock.grain_rad },
     };
     assert_eq!(job.operations[0].kind, rough);
     let raster = OperationKind::Raster {

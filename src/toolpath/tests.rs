@@ -334,18 +334,22 @@ fn assert_entries_are_ramped(path: &Toolpath, job: &Job, wood: &mut Heightfield)
     }
 }
 
-/// Takes a move out of the wood by stamping.
+/// Takes a move out of the wood by stamping. Between stamps nodes at the very rim of the sweep would stay, up to the sagitta
+/// of a step, and with them whole rows of pillars where passes lie a radius from a row of nodes.
 fn lower(wood: &mut Heightfield, profile: &Profile, m: &Move) {
     let grid = *wood.grid();
     let r = profile.radius_mm();
     let (way, n) = (m.to - m.from, (m.length_mm() / 0.05).ceil().max(1.0));
+    let sagitta = 0.025 * 0.025 / (2.0 * r) + 1e-6;
     for k in 0..=n as usize {
         let tip = m.from + way * (k as f64 / n);
         let low = grid.to_grid(tip.truncate() - DVec2::splat(r)).max(DVec2::ZERO);
         let high = grid.to_grid(tip.truncate() + DVec2::splat(r)).max(DVec2::ZERO);
         for j in low.y as usize..=(high.y as usize).min(grid.ny - 1) {
             for i in low.x as usize..=(high.x as usize).min(grid.nx - 1) {
-                if let Some(h) = profile.height_at(grid.node(i, j).distance(tip.truncate())) {
+                let away = grid.node(i, j).distance(tip.truncate());
+                let away = if away < r + sagitta { away.min(r) } else { away };
+                if let Some(h) = profile.height_at(away) {
                     let z = &mut wood.z_mut()[j * grid.nx + i];
                     *z = z.min((tip.z + h) as f32);
                 }
