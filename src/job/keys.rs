@@ -207,9 +207,9 @@ const fn key(name: &'static str, kind: Kind, default: Fallback, doc: &'static st
 use Fallback::{Flag, Number, Required, Rule, Text};
 
 /// The sections of a job, in the order in which they are written out.
-pub(super) static JOB: [&Section; 11] = [
+pub(super) static JOB: [&Section; 12] = [
     &TOP, &STOCK, &ARTWORK, &TRACE, &RELIEF, &TOLERANCE, &SAFETY, &KEEP_OUT, &LAYER, &SURFACE,
-    &OPERATION,
+    &GROUP, &OPERATION,
 ];
 
 /// Top level of a job.
@@ -249,6 +249,12 @@ pub(super) static TOP: Section = Section {
             Kind::Forms("[[layer]] tables"),
             Rule("one for each fill and each stroke colour, in paint order"),
             "the layers, bottom to top",
+        ),
+        key(
+            "group",
+            Kind::Forms("[[group]] tables"),
+            Rule("none"),
+            "layers that are merged first and then combined as one",
         ),
         key(
             "operation",
@@ -599,6 +605,38 @@ pub(super) static LAYER: Section = Section {
             Kind::Flag,
             Flag(false),
             "trim the layer to what the paint order leaves visible",
+        ),
+        key(
+            "group",
+            Kind::Text,
+            Rule("none: it joins what is below by itself"),
+            "name of the [[group]] that it is merged into first",
+        ),
+    ],
+};
+
+/// `[[group]]`
+pub(super) static GROUP: Section = Section {
+    name: "group",
+    header: "[[group]]",
+    doc: "layers next to each other that name it by `group` are merged first, on flat ground of their own; then \
+          the whole joins what is below, in the place of its layers",
+    keys: &[
+        key("name", Kind::Text, Required, "what its layers name it by"),
+        key("combine", Kind::Choice(COMBINES), Text("max"), "how the whole joins what is below"),
+        key(
+            "height_mm",
+            mm(0.0, 500.0),
+            Rule("none: it must be given for multiply"),
+            "multiply only: what is below is scaled by the group's height over this",
+        ),
+        key("offset_mm", mm(-500.0, 500.0), Number(0.0), "raises the whole group"),
+        key("blend_mm", mm(0.0, 100.0), Number(0.0), "radius of the soft seam for max and min"),
+        key(
+            "feather_mm",
+            mm(0.0, 100.0),
+            Number(0.0),
+            "width over which replace, add and subtract fade in from the outline of the whole",
         ),
     ],
 };

@@ -89,19 +89,19 @@ impl Draft {
     /// A layer that stands by itself must not be asked to rise out of the stock, unless a later layer may
     /// lower it again. What the surfaces really reach is checked when they are made.
     fn check_heights(&self, layers: &[LayerSpec]) -> Result<(), JobError> {
+        let group_of = |index| self.groups.iter().find(|group| group.layers.contains(&index));
+        let stands = |combine| matches!(combine, Combine::Base | Combine::Max | Combine::Replace);
+        let lowers = |combine| !matches!(combine, Combine::Max | Combine::Add);
         for (index, layer) in layers.iter().enumerate() {
-            let alone = matches!(layer.combine, Combine::Base | Combine::Max | Combine::Replace);
-            let lowered = layers[index + 1..].iter().any(|later| {
-                matches!(
-                    later.combine,
-                    Combine::Min
-                        | Combine::Multiply
-                        | Combine::Subtract
-                        | Combine::Replace
-                        | Combine::Base
-                )
+            let group = group_of(index);
+            let alone = stands(layer.combine) && group.is_none_or(|group| stands(group.combine));
+            let lowered = (index + 1..layers.len()).any(|later| match group_of(later) {
+                Some(other) if group != Some(other) => lowers(other.combine),
+                _ => lowers(layers[later].combine),
             });
-            let top = layer.height_mm.max(layer.base_mm) + layer.offset_mm;
+            let top = layer.height_mm.max(layer.base_mm)
+                + layer.offset_mm
+                + group.map_or(0.0, |group| group.offset_mm);
             if alone && !lowered && top > self.depth_mm + TOUCHING_MM {
                 let message = format!(
                     "layer '{}' would rise {} mm above the stock: it is {} mm high, the background lies {} mm deep",
@@ -143,15 +143,7 @@ fn default_layer(select: Selector, name: String) -> LayerDraft {
 }
 
 fn layer(table: &Table<'_>, select: Selector, name: String) -> Result<LayerDraft, JobError> {
-    let combine = [
-        Combine::Base,
-        Combine::Add,
-        Combine::Max,
-        Combine::Min,
-        Combine::Subtract,
-        Combine::Multiply,
-        Combine::Replace,
-    ][table.choice("combine")];
+    let combine = combine_of(table);
     let height_mm = table.number("height_mm");
     let relative = matches!(combine, Combine::Add | Combine::Subtract | Combine::Multiply);
     if height_mm.is_none() && relative {
@@ -185,6 +177,11 @@ fn layer(table: &Table<'_>, select: Selector, name: String) -> Result<LayerDraft
         visible: table.flag("visible"),
     };
     Ok(LayerDraft { spec, height_mm })
+}
+
+/// How a layer or a group joins what is below it.
+pub(super) fn combine_of(table: &Table<'_>) -> Combine {
+    Combine::ALL[table.choice("combine")]
 }
 
 fn read_slope_cap(table: &Table<'_>) -> Result<f64, JobError> {

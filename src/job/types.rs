@@ -1,5 +1,7 @@
 //! What a checked job is made of. Every value here is in range; lengths are mm, speeds mm/min.
 
+use super::group::GroupSpec;
+use super::keys::COMBINES;
 use super::surface::SurfaceSpec;
 use crate::geom::{Bounds, DVec2, DVec3, Tolerance};
 
@@ -18,6 +20,8 @@ pub struct Job {
     pub relief: ReliefSpec,
     /// The layers, bottom to top; never empty.
     pub layers: Vec<LayerSpec>,
+    /// Groups of layers that are merged first, in the order of their layers, which no two of them share.
+    pub groups: Vec<GroupSpec>,
     /// The operations in the order of work; never empty.
     pub operations: Vec<Operation>,
     /// Where nothing may be cut: clamps, screws, knots.
@@ -422,6 +426,24 @@ pub enum Combine {
     Multiply,
     /// `l`
     Replace,
+}
+
+impl Combine {
+    /// All of them.
+    pub const ALL: [Self; 7] = [
+        Self::Base,
+        Self::Add,
+        Self::Max,
+        Self::Min,
+        Self::Subtract,
+        Self::Multiply,
+        Self::Replace,
+    ];
+
+    /// Its name in job files.
+    pub fn name(self) -> &'static str {
+        COMBINES[self as usize]
+    }
 }
 
 /// One operation with its cutter and speeds, all known.
