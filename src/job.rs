@@ -27,7 +27,7 @@ pub use error::{Fault, JobError};
 pub use group::GroupSpec;
 pub use library::{BUILT_IN_FILES, Library};
 pub use surface::{
-    Control, CrestSpec, Join, Profile, Prune, ScanShape, Scheme, Significance, SkeletonSpec, Split,
+    Control, CrestSpec, Join, Profile, Prune, Scheme, Significance, SkeletonSpec, Split,
     SubdivisionSpec, SurfaceSpec,
 };
 pub use types::{

@@ -139,7 +139,7 @@ pub(super) mod rule {
 pub(super) const ORIGINS: &[&str] =
     &["lower-left", "lower-right", "upper-left", "upper-right", "center"];
 /// Names of [`super::Profile`], in its order.
-pub(super) const PROFILES: &[&str] = &["parabola", "round", "chamfer", "cove", "ogee"];
+pub(super) const PROFILES: &[&str] = &["parabola", "round", "chamfer", "cove", "ogee", "bell"];
 /// Names of [`super::Combine`], in its order.
 pub(super) const COMBINES: &[&str] =
     &["base", "add", "max", "min", "subtract", "multiply", "replace"];
@@ -162,8 +162,6 @@ pub(super) const METHODS: &[&str] = &[
     "catmull-clark",
     "doo-sabin",
 ];
-/// Names of [`super::ScanShape`], in its order.
-pub(super) const SCAN_SHAPES: &[&str] = &["bell", "parabola"];
 /// Names of [`super::Control`], in its order.
 pub(super) const CONTROLS: &[&str] = &["even", "split", "quad4", "quad6"];
 /// Names of [`super::Prune`], in its order.
@@ -670,7 +668,7 @@ pub(super) static SURFACE: Section = Section {
             "profile",
             Kind::Choice(PROFILES),
             Text("parabola"),
-            "cross-section of the flank (ruled, ratio, harmonic, profile, r-function)",
+            "cross-section of the flank (all but patches and subdivision); teddy: by default round, scan-lines: bell",
         ),
         key(
             "radius_mm",
@@ -689,12 +687,6 @@ pub(super) static SURFACE: Section = Section {
             Kind::Whole { min: 1, max: 32 },
             Number(8.0),
             "scan-lines only: number of directions; 1 = rows along x, each by itself",
-        ),
-        key(
-            "shape",
-            Kind::Choice(SCAN_SHAPES),
-            Text("bell"),
-            "scan-lines only: cross-section, a normal distribution or the parabola",
         ),
         key(
             "levels",

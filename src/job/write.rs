@@ -7,8 +7,8 @@ use super::error::JobError;
 use super::group::{GroupSpec, users_of};
 use super::keys::{
     ARTWORK, BACKGROUND, CONTROLS, CUTTER, FOLLOWS, Fallback, GROUP, JOB, JOINS, LAYER, MACHINE,
-    MILLINGS, OPERATION, ORIGINS, PATTERNS, PROFILES, PRUNES, RELIEF, SAFETY, SCAN_SHAPES, SPLITS,
-    STOCK, SURFACE, Section, TOLERANCE, TOP, TRACE, TRACE_METHODS, WOOD, rule,
+    MILLINGS, OPERATION, ORIGINS, PATTERNS, PROFILES, PRUNES, RELIEF, SAFETY, SPLITS, STOCK,
+    SURFACE, Section, TOLERANCE, TOP, TRACE, TRACE_METHODS, WOOD, rule,
 };
 use super::library::Library;
 use super::surface::{Prune, SkeletonSpec, SurfaceSpec};
@@ -356,11 +356,11 @@ fn surface_lines(surface: &SurfaceSpec, of_picture: bool) -> Vec<Line> {
                 ("order", order.to_string()),
             ];
         }
-        SurfaceSpec::ScanLines { directions, shape } => {
+        SurfaceSpec::ScanLines { directions, profile } => {
             return vec![
                 ("method", quoted("scan-lines")),
+                ("profile", quoted(PROFILES[*profile as usize])),
                 ("directions", directions.to_string()),
-                ("shape", quoted(SCAN_SHAPES[*shape as usize])),
             ];
         }
         SurfaceSpec::Ruled(crest)
@@ -380,7 +380,6 @@ fn surface_lines(surface: &SurfaceSpec, of_picture: bool) -> Vec<Line> {
             lines.extend(own.adaptive_mm.map(|mm| ("adaptive_mm", number(mm))));
             lines.push(("control", quoted(CONTROLS[own.control as usize])));
         }
-        SurfaceSpec::Teddy(_) => {}
         _ => lines.push(("profile", quoted(PROFILES[crest.profile as usize]))),
     }
     // What differs from the defaults; the rest would bury it.

@@ -7,7 +7,7 @@ use crate::job::{
 use crate::outline::{Figure, OutlineLayer, Region};
 use crate::relief::band::COVERAGE_ROUNDING;
 use crate::relief::{coverage, grid_of};
-use crate::surface::{Mesh, raise_all};
+use crate::surface::{Mesh, profile_at, raise_all};
 use proptest::prelude::*;
 use std::f64::consts::TAU;
 
@@ -764,6 +764,27 @@ proptest! {
         };
         for (k, (a, b)) in highest.target.z().iter().zip(nested.target.z()).enumerate() {
             prop_assert!(on_border(k) || (a - b).abs() < 1e-5, "{a} {b}");
+        }
+    }
+}
+
+/// On a long band every method that goes by the way from the outline to the middle has exactly its cross-section.
+#[test]
+fn every_method_with_a_cross_section_shows_it_on_a_band() {
+    let outlines = outlines(vec![vec![rectangle(2.0, 6.0, 16.0, 4.0)]]);
+    for profile in Profile::ALL.into_iter().filter(|profile| *profile != Profile::Parabola) {
+        for method in ["ruled", "ratio", "harmonic", "teddy", "profile", "scan-lines"] {
+            let surface = SurfaceSpec::Profile { profile, radius_mm: None }.by(method).unwrap();
+            let spec = LayerSpec { surface, base_mm: 0.5, ..flat(method, 2.5, Combine::Max) };
+            let relief = relief(&job(vec![spec]), &outlines).unwrap();
+            // Samples of its spine lie apart.
+            let tolerance = if method == "scan-lines" { 0.05 } else { 0.012 };
+            for k in 1..16 {
+                let y = 6.0 + f64::from(k) * PITCH;
+                let exact = 0.5 + 2.0 * profile_at(profile, 1.0 - (y - 8.0).abs() / 2.0);
+                let got = height(&relief, 10.0, y);
+                assert!((got - exact).abs() < tolerance, "{method} {profile:?} {y}: {got} {exact}");
+            }
         }
     }
 }

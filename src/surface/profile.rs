@@ -31,18 +31,32 @@ pub fn profile_at(profile: Profile, u: f64) -> f64 {
         Profile::Chamfer => u,
         Profile::Cove => 1.0 - (1.0 - u * u).sqrt(),
         Profile::Ogee => u * u * (3.0 - 2.0 * u),
+        Profile::Bell => bell(1.0 - u),
     }
 }
 
+/// Width of the normal distribution of a bell, in half widths.
+const SIGMA: f64 = 0.45;
+
+/// The normal distribution over 0..=1, cut and normalised: 1 at 0, 0 at 1.
+fn bell(t: f64) -> f64 {
+    let foot = libm::exp(-1.0 / (2.0 * SIGMA * SIGMA));
+    (libm::exp(-t * t / (2.0 * SIGMA * SIGMA)) - foot) / (1.0 - foot)
+}
+
+/// Steepest slope of a bell: `exp(-1/2) / (sigma (1 - e))`, e what the distribution has at the outline.
+const BELL_STEEPNESS: f64 = 1.472_505;
+
 /// Nominal steepness of a profile: its slope in units of height over radius that the slope cap goes by.
 ///
-/// Parabola 2 and chamfer 1 at the foot, ogee 1.5 half way up; round (at the foot) and cove (at the
+/// Parabola 2 and chamfer 1 at the foot, ogee 1.5 half way up, bell 1.4725 one sigma from the ridge; round (at the foot) and cove (at the
 /// ridge) are vertical at one point and count as the parabola that they resemble elsewhere.
 fn steepness(profile: Profile) -> f64 {
     match profile {
         Profile::Parabola | Profile::Round | Profile::Cove => 2.0,
         Profile::Chamfer => 1.0,
         Profile::Ogee => 1.5,
+        Profile::Bell => BELL_STEEPNESS,
     }
 }
 
@@ -59,7 +73,7 @@ pub fn smooth_cap(x: f64) -> f64 {
 
 /// Height of the ridge under the slope cap, mm: `b + (H - b) phi(x)` with
 /// `x = slope_cap * R / (c (H - b))` and c the nominal steepness of the profile (parabola, round, cove
-/// 2, ogee 1.5, chamfer 1). A region so narrow that its flank would be steeper gets a lower ridge.
+/// 2, ogee 1.5, bell 1.47, chamfer 1). A region so narrow that its flank would be steeper gets a lower ridge.
 /// An infinite `slope_cap` leaves the height alone; a height below the base counts as the base.
 pub fn capped_height(
     base_mm: f64,
