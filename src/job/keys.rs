@@ -589,7 +589,7 @@ pub(super) static LAYER: Section = Section {
             "draft_deg",
             deg(0.0, 60.0),
             Number(0.0),
-            "slope of walls from the vertical (with base_mm > 0)",
+            "slope of walls from the vertical: where the outline (base_mm + offset_mm) stands off what is below",
         ),
         key(
             "slope_cap",

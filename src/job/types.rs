@@ -398,7 +398,7 @@ pub struct LayerSpec {
     pub blend_mm: f64,
     /// Width over which replace, add and subtract fade in from the outline, mm.
     pub feather_mm: f64,
-    /// Slope of walls from the vertical (with `base_mm` > 0), radians.
+    /// Slope of walls from the vertical, where the outline stands off what is below, radians.
     pub draft_rad: f64,
     /// Steepest slope (rise over run) that a narrow figure's flank may get; infinite = no cap.
     pub slope_cap: f64,

@@ -6,7 +6,7 @@ use super::coverage::{coverage, samples};
 use super::prepared::{Body, Group, Joint, Layer, Step};
 use crate::geom::{DVec2, Grid};
 use crate::job::Combine;
-use crate::surface::{Patch, Segments, Window, inside_spans};
+use crate::surface::{Patch, Segments, Window, inside_spans, lean};
 use std::ops::Range;
 
 /// Coverage closer to 0 or 1 than this is 0 or 1: rounding of the running sums.
@@ -53,7 +53,7 @@ impl<'a> Band<'a> {
         let n = window.len();
         let joints = || steps.iter().flat_map(Step::joints);
         let blended = joints().any(Joint::blended);
-        let measured = blended || joints().any(Joint::feathered);
+        let measured = joints().any(Joint::measured);
         let field = |used: bool, v: f32| vec![v; if used { n } else { 0 }];
         Self {
             grid,
@@ -120,9 +120,10 @@ impl<'a> Band<'a> {
             for k in self.at(i.start, j)..self.at(i.end, j) {
                 let height = self.height[k];
                 // Where only a part of the cell is covered the outline counts.
-                let own =
-                    if height.is_nan() { self.outline_mm(k, layer) } else { f64::from(height) };
-                self.join(k, own, &layer.joint, index + 1);
+                let on_outline = height.is_nan() || layer.joint.draft > 0.0;
+                let outline = if on_outline { self.outline_mm(k, layer) } else { 0.0 };
+                let own = if height.is_nan() { outline } else { f64::from(height) };
+                self.join(k, [own, outline], &layer.joint, index + 1);
             }
         }
     }
@@ -156,7 +157,7 @@ impl<'a> Band<'a> {
                 let inside = own.marks[k] & INSIDE != 0;
                 self.height[k] = if inside { height as f32 } else { f32::NAN };
                 let mark = usize::from(own.marks[k] & LAYER);
-                self.join(k, height, &group.joint, if mark == 0 { last } else { mark });
+                self.join(k, [height; 2], &group.joint, if mark == 0 { last } else { mark });
             }
         }
     }
@@ -286,9 +287,9 @@ impl<'a> Band<'a> {
         hole.map_or(layer.outline_mm, |holes| holes.base_mm)
     }
 
-    /// Joins the present layer or group, `own` mm high at node `k` of the band, to what is below it there; `mark` is 1 +
-    /// the layer to name for it.
-    fn join(&mut self, k: usize, own: f64, joint: &Joint, mark: usize) {
+    /// Joins the present layer or group to what is below it at node `k` of the band: `own` mm high there, and the outline
+    /// next to it as high as the second number tells. `mark` is 1 + the layer to name for it.
+    fn join(&mut self, k: usize, own: [f64; 2], joint: &Joint, mark: usize) {
         let (bare, cover) = (self.height[k].is_nan(), f64::from(self.cover[k]));
         let base = joint.combine == Combine::Base;
         if cover == 0.0 && (bare || !base) {
@@ -303,8 +304,16 @@ impl<'a> Band<'a> {
         };
         let below = self.below.get(k).map_or(0.0, |&d| f64::from(d));
         let fade = if joint.blended() { (depth.min(below) / joint.blend_mm).min(1.0) } else { 0.0 };
-        let l = joint.offset_mm + own;
-        let op = |c: f64| joined(joint.combine, c, l, joint.height_mm, joint.blend_mm, fade);
+        let [l, outline] = own.map(|own| joint.offset_mm + own);
+        let op = |c: f64| {
+            let z = joined(joint.combine, c, l, joint.height_mm, joint.blend_mm, fade);
+            if joint.draft <= 0.0 {
+                return z;
+            }
+            // The wall between what is below and the outline.
+            let wall = joined(joint.combine, c, outline, joint.height_mm, 0.0, 0.0) - c;
+            z - lean(wall, depth, joint.draft)
+        };
         let c = f64::from(self.z[k]);
         let (covered, fresh) = if base { self.set_ground(k) } else { self.cover_more(k) };
         let z = if joint.feathered() || base || covered <= 0.0 {

@@ -21,6 +21,10 @@
 //! The layers of a group go through all this on bare ground of their own; what comes out, the mean height of what they
 //! cover of each cell, is then joined like a layer.
 //!
+//! Walls with a draft: those that a layer of its own height stands up with lean within its surface. A layer that takes the
+//! place of what is below, scales or limits it, makes walls between the two; there op(c, l) is less the part that the
+//! wall op(c, outline) - c still lacks at the node's distance inside the outline.
+//!
 //! Smooth seams: the bulge of max and min is scaled by `min(1, d/k)`, d = distance inside the upper
 //! outline or inside the outlines below, whichever is less, so that it vanishes on both.
 

@@ -777,14 +777,101 @@ fn every_method_with_a_cross_section_shows_it_on_a_band() {
             let surface = SurfaceSpec::Profile { profile, radius_mm: None }.by(method).unwrap();
             let spec = LayerSpec { surface, base_mm: 0.5, ..flat(method, 2.5, Combine::Max) };
             let relief = relief(&job(vec![spec]), &outlines).unwrap();
-            // Samples of its spine lie apart.
-            let tolerance = if method == "scan-lines" { 0.05 } else { 0.012 };
+            // Teddy's crest goes by the width, which is largest across the corners at the ends.
+            let rise = if method == "teddy" { height(&relief, 10.0, 8.0) - 0.5 } else { 2.0 };
             for k in 1..16 {
                 let y = 6.0 + f64::from(k) * PITCH;
-                let exact = 0.5 + 2.0 * profile_at(profile, 1.0 - (y - 8.0).abs() / 2.0);
+                let far = (y - 8.0).abs();
+                let exact = 0.5 + rise * profile_at(profile, 1.0 - far / 2.0);
+                // Samples of the spine of scan lines lie two cells apart: no node is further than one from the nearest.
+                let apart = if method == "scan-lines" { PITCH } else { 0.0 };
+                let lower = (2.0 - far) / (2.0 - far + libm::hypot(far, apart));
+                let tolerance = 0.012 + exact - 0.5 - rise * profile_at(profile, lower);
                 let got = height(&relief, 10.0, y);
                 assert!((got - exact).abs() < tolerance, "{method} {profile:?} {y}: {got} {exact}");
             }
+        }
+    }
+}
+
+/// A plate of 3 mm under a layer with draft whose left side lies at x = 4.
+fn on_a_plate(spec: LayerSpec) -> Relief {
+    let plate = flat("plate", 3.0, Combine::Max);
+    let outlines = outlines(vec![
+        vec![rectangle(1.0, 1.0, 18.0, 14.0)],
+        vec![rectangle(4.0, 2.0, 12.0, 12.0)],
+    ]);
+    relief(&job(vec![plate, spec]), &outlines).unwrap()
+}
+
+#[test]
+fn walls_lean_by_their_draft_whatever_makes_them() {
+    // By how much each wall goes up or down from the plate (or, for max, from the background).
+    let layer =
+        |combine, base_mm, offset_mm| LayerSpec { offset_mm, ..flat("up", base_mm, combine) };
+    let table: [(LayerSpec, f64); 12] = [
+        (layer(Combine::Add, 2.0, 0.0), 2.0),
+        (layer(Combine::Add, 1.5, 0.5), 2.0),
+        (layer(Combine::Add, 0.0, -1.5), -1.5),
+        (layer(Combine::Subtract, 2.0, 0.0), -2.0),
+        (layer(Combine::Subtract, 1.0, -2.0), 1.0),
+        (layer(Combine::Replace, 1.0, 0.0), -2.0),
+        (layer(Combine::Replace, 4.0, 1.0), 2.0),
+        (layer(Combine::Base, 1.5, 0.0), -1.5),
+        (layer(Combine::Min, 1.0, 0.0), -2.0),
+        (layer(Combine::Min, 4.0, 0.0), 0.0),
+        // Half of the plate.
+        (layer(Combine::Multiply, 4.0, -2.0), -1.5),
+        (layer(Combine::Multiply, 4.0, 0.0), 0.0),
+    ];
+    for degrees in [45.0_f64, 30.0] {
+        let draft_rad = degrees.to_radians();
+        for (spec, wall) in &table {
+            let relief = on_a_plate(LayerSpec { draft_rad, ..spec.clone() });
+            for k in 0..24 {
+                let d = f64::from(k) * PITCH;
+                let rise = (d / libm::tan(draft_rad)).min(wall.abs());
+                let exact = 3.0 + wall.signum() * rise;
+                let got = height(&relief, 4.0 + d, 8.0);
+                assert!((got - exact).abs() < 1e-5, "{:?} {d}: {got} {exact}", spec.combine);
+            }
+            near(height(&relief, 3.5, 8.0), 3.0);
+        }
+    }
+}
+
+#[test]
+fn a_layer_that_stands_by_itself_leans_from_the_ground_up() {
+    // An outline 4 mm high, 1.5 of it by the offset, on ground and over a plate of 3 mm, at 45 degrees.
+    let spec = LayerSpec {
+        offset_mm: 1.5,
+        draft_rad: std::f64::consts::FRAC_PI_4,
+        ..flat("up", 2.5, Combine::Max)
+    };
+    let over = on_a_plate(spec.clone());
+    let outlines = outlines(vec![vec![rectangle(4.0, 2.0, 12.0, 12.0)]]);
+    let alone = relief(&job(vec![spec]), &outlines).unwrap();
+    for k in 0..24 {
+        let d = f64::from(k) * PITCH;
+        near(height(&alone, 4.0 + d, 8.0), d.min(4.0));
+        near(height(&over, 4.0 + d, 8.0), d.clamp(3.0, 4.0));
+    }
+}
+
+/// b(d) = b min(1, d / (b tan(draft))) for every method: on a flat surface nothing else is left.
+#[test]
+fn the_walls_of_every_method_have_their_draft() {
+    let outlines = outlines(vec![vec![rectangle(2.0, 2.0, 16.0, 12.0)]]);
+    for method in SurfaceSpec::METHODS {
+        let one = flat(method, 2.0, Combine::Max);
+        let surface = one.surface.by(method).unwrap();
+        let draft_rad = std::f64::consts::FRAC_PI_4;
+        let relief =
+            relief(&job(vec![LayerSpec { surface, draft_rad, ..one }]), &outlines).unwrap();
+        for k in 1..24 {
+            let d = f64::from(k) * PITCH;
+            let got = height(&relief, 2.0 + d, 8.0);
+            assert!((got - d.min(2.0)).abs() < 1e-5, "{method} {d}: {got}");
         }
     }
 }

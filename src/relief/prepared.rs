@@ -7,7 +7,7 @@ use crate::job::{Combine, GroupSpec, Job, LayerSpec};
 use crate::outline::{Figure, Outlines, melted};
 use crate::surface::{
     FINE, FINE_ROWS, Mesh, Patch, Segments, Surface, Window, averaged, finer, lower_walls,
-    outline_height,
+    outline_height, own_wall,
 };
 use rayon::prelude::*;
 
@@ -49,17 +49,21 @@ pub(super) struct Joint {
     pub(super) blend_mm: f64,
     /// Width of the feather; 0 where the way of joining has none.
     pub(super) feather_mm: f64,
+    /// Run over rise of walls between what is below and the outline; 0: upright, or leaned within the surface.
+    pub(super) draft: f64,
 }
 
 impl Joint {
     fn of_layer(spec: &LayerSpec) -> Self {
         let LayerSpec { combine, offset_mm, height_mm, blend_mm, feather_mm, .. } = *spec;
-        Self { combine, offset_mm, height_mm, blend_mm, feather_mm }.cleared()
+        let within = matches!(combine, Combine::Max | Combine::Add | Combine::Subtract);
+        let draft = if within { 0.0 } else { libm::tan(spec.draft_rad) };
+        Self { combine, offset_mm, height_mm, blend_mm, feather_mm, draft }.cleared()
     }
 
     fn of_group(spec: &GroupSpec) -> Self {
         let GroupSpec { combine, offset_mm, height_mm, blend_mm, feather_mm, .. } = *spec;
-        Self { combine, offset_mm, height_mm, blend_mm, feather_mm }.cleared()
+        Self { combine, offset_mm, height_mm, blend_mm, feather_mm, draft: 0.0 }.cleared()
     }
 
     /// Without what its way of joining does not use.
@@ -79,6 +83,11 @@ impl Joint {
 
     pub(super) fn feathered(&self) -> bool {
         self.feather_mm > 0.0
+    }
+
+    /// It needs distances inside its own outlines.
+    pub(super) fn measured(&self) -> bool {
+        self.blended() || self.feathered() || self.draft > 0.0
     }
 }
 
@@ -147,7 +156,7 @@ pub(super) struct Holes {
 impl Holes {
     fn of(spec: &LayerSpec, figures: &[Figure]) -> Option<Self> {
         let base_mm = spec.surface.crest()?.hole_base_mm.filter(|&mm| mm != spec.base_mm)?;
-        let base_mm = if spec.draft_rad > 0.0 { base_mm.min(0.0) } else { base_mm };
+        let base_mm = base_mm - own_wall(spec, base_mm);
         let regions = || figures.iter().flat_map(|f| &f.regions);
         let outer = Segments::of_rings(regions().map(|r| r.outer.as_slice()));
         let inner = Segments::of_rings(regions().flat_map(|r| r.holes.iter().map(Vec::as_slice)));
@@ -176,7 +185,7 @@ pub(super) fn prepare<'a>(
     let softened = seams.max().unwrap_or(0);
     let mut steps = Vec::with_capacity(surfaces.len());
     for (index, surfaces) in surfaces.into_iter().enumerate() {
-        let measured = index < softened || Joint::of_layer(&job.layers[index]).feathered();
+        let measured = index < softened || Joint::of_layer(&job.layers[index]).measured();
         let figures = &outlines.layers[index].figures;
         let layer = layer(&job.layers[index], figures, surfaces, measured, grid, notes)?;
         let Some(spec) = job.groups.iter().find(|group| group.layers.contains(&index)) else {
@@ -186,7 +195,7 @@ pub(super) fn prepare<'a>(
         if index == spec.layers.start {
             let joint = Joint::of_group(spec);
             let figures = outlines.layers[spec.layers.clone()].iter().flat_map(|l| &l.figures);
-            let measured = joint.feathered() || index < softened;
+            let measured = joint.measured() || index < softened;
             let outline = measured.then(|| GroupOutline::of(figures, grid));
             steps.push(Step::Group(Group { layers: Vec::new(), joint, outline }));
         }

@@ -13,7 +13,7 @@
 
 use super::{FINE_ROWS, Patch, Remark, Segments, Window, averaged, inscribed_radius, inside_spans};
 use crate::geom::Grid;
-use crate::job::{LayerSpec, Profile};
+use crate::job::{Combine, LayerSpec, Profile};
 use crate::outline::{Figure, Region};
 
 /// How exactly the inscribed radius is found, in cells.
@@ -89,9 +89,30 @@ pub fn capped_height(
     base_mm + rise * smooth_cap(slope_cap * radius_mm / (steepness(profile) * rise))
 }
 
-/// Height of a layer's surface on its outline, mm: its base, or 0 where the wall has a draft.
+/// The wall that the draft of a layer leans within its surface, over an outline of height `base_mm`: how high it stands,
+/// mm, negative where it goes down; 0 for an upright wall.
+///
+/// The surface of a layer that stands by itself rises from the ground, one that is added or subtracted from what is below.
+/// Walls of the others reach from what is below to the layer: they are leaned when it is joined.
+pub fn own_wall(layer: &LayerSpec, base_mm: f64) -> f64 {
+    let step_mm = base_mm + layer.offset_mm;
+    match layer.combine {
+        _ if layer.draft_rad <= 0.0 => 0.0,
+        Combine::Max => step_mm.max(0.0),
+        Combine::Add | Combine::Subtract => step_mm,
+        Combine::Base | Combine::Min | Combine::Replace | Combine::Multiply => 0.0,
+    }
+}
+
+/// What a wall of this height (negative: downwards) lacks at distance `d` inside its outline when its run over its rise
+/// is `draft`: so `b` becomes `b min(1, d / (b draft))`.
+pub fn lean(wall_mm: f64, d: f64, draft: f64) -> f64 {
+    if wall_mm == 0.0 { 0.0 } else { wall_mm.signum() * (wall_mm.abs() - d / draft).max(0.0) }
+}
+
+/// Height of a layer's surface on its outline, mm: its base, less the wall that leans within it.
 pub fn outline_height(layer: &LayerSpec) -> f64 {
-    if layer.base_mm > 0.0 && layer.draft_rad > 0.0 { 0.0 } else { layer.base_mm }
+    layer.base_mm - own_wall(layer, layer.base_mm)
 }
 
 /// All that shapes the flank of one region.
@@ -103,7 +124,8 @@ pub(super) struct Flank {
     /// `None`: the inscribed radius of the region.
     radius_mm: Option<f64>,
     slope_cap: f64,
-    /// Run over rise of a wall; 0 = upright.
+    /// Height of the wall that leans, and its run over its rise.
+    wall_mm: f64,
     draft: f64,
 }
 
@@ -116,18 +138,15 @@ impl Flank {
             height_mm: layer.height_mm,
             radius_mm,
             slope_cap: layer.slope_cap,
+            wall_mm: own_wall(layer, layer.base_mm),
             draft: libm::tan(layer.draft_rad),
         }
     }
 
     /// Height at distance `d` inside the outline, mm, under a ridge of `ridge_mm` and bevel `radius_mm`.
     fn at(&self, d: f64, ridge_mm: f64, radius_mm: f64) -> f64 {
-        let wall = if self.base_mm > 0.0 && self.draft > 0.0 {
-            self.base_mm.min(d / self.draft)
-        } else {
-            self.base_mm
-        };
-        wall + (ridge_mm - self.base_mm) * profile_at(self.profile, d / radius_mm)
+        let foot = self.base_mm - lean(self.wall_mm, d, self.draft);
+        foot + (ridge_mm - self.base_mm) * profile_at(self.profile, d / radius_mm)
     }
 }
 
