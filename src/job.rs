@@ -14,6 +14,7 @@ mod library;
 mod draft;
 mod speeds;
 mod layer;
+mod group;
 mod operation;
 mod settle;
 mod write;
@@ -23,9 +24,10 @@ mod tests;
 pub use colors::swatch_name;
 pub use draft::Draft;
 pub use error::{Fault, JobError};
+pub use group::GroupSpec;
 pub use library::{BUILT_IN_FILES, Library};
 pub use surface::{
-    Control, CrestSpec, Join, Profile, Prune, ScanShape, Scheme, Significance, SkeletonSpec, Split,
+    Control, CrestSpec, Join, Profile, Prune, Scheme, Significance, SkeletonSpec, Split,
     SubdivisionSpec, SurfaceSpec,
 };
 pub use types::{

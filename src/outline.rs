@@ -10,12 +10,14 @@
 //! leaves here passes [`Region::check`]. What was changed is said in the notes; nothing is dropped in silence.
 
 mod check;
+mod melt;
 mod notes;
 mod regions;
 mod trace;
 
 pub use check::RegionFault;
 pub(crate) use check::meeting_edges;
+pub use melt::melted;
 pub use trace::trace;
 
 use crate::geom::{Bounds, DVec2, Ring, bounds_of, contains_even_odd, signed_area};

@@ -4,16 +4,19 @@
 //! background, and gives the target in work coordinates. A relief that does not fit into the stock is
 //! an error that says by how much, where, and what to change.
 
+mod band;
 mod combine;
 mod coverage;
 mod ground;
 mod merge;
+mod prepared;
 mod raster;
 
 pub use combine::{feather_weight, joined, smooth_max, smooth_min};
 pub use coverage::coverage;
 pub use ground::Grounds;
-pub use merge::{merge, sampled};
+pub use merge::merge;
+pub use prepared::sampled;
 pub use raster::{Raster, rasterise};
 
 use crate::geom::{Grid, GridError, Heightfield};
@@ -47,6 +50,12 @@ pub enum ReliefError {
         figures: usize,
         /// Surfaces given.
         surfaces: usize,
+    },
+    /// The layers of a group are not there, or belong to another one.
+    #[error("group '{group}' has no layers of its own; groups are runs of layers, in their order")]
+    BadGroup {
+        /// Name of the group.
+        group: String,
     },
     /// The mesh of a figure breaks its invariants.
     #[error("layer '{layer}': the surface of {figure} is faulty: {fault}; simplify that outline")]

@@ -36,7 +36,7 @@ pub use literal::{Over, patches};
 pub use mesh::{Mesh, MeshError};
 pub use notes::tell;
 pub use patch::{FINE, FINE_ROWS, Patch, Window, averaged, finer};
-pub use profile::{capped_height, outline_height, profile_at, smooth_cap};
+pub use profile::{capped_height, lean, outline_height, own_wall, profile_at, smooth_cap};
 pub use ratio::{
     Way, field as ratio_field, field_finely as ratio_field_finely, field_of as crest_field,
 };

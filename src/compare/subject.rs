@@ -252,8 +252,13 @@ impl Crest {
 /// makes of them: twice the heights of all layers, one on top of the other.
 fn standing_free(job: &Job, layers: Vec<LayerSpec>) -> Job {
     let heights = layers.iter().map(|l| l.height_mm.abs().max(l.base_mm.abs()) + l.offset_mm.abs());
-    let depth_mm = 2.0 * heights.sum::<f64>() + 1.0;
+    let offsets = job.groups.iter().map(|group| group.offset_mm.abs());
+    let depth_mm = 2.0 * (heights.sum::<f64>() + offsets.sum::<f64>()) + 1.0;
     let mut job = job.clone();
+    // A layer that is looked at alone has no group to join.
+    if layers.len() != job.layers.len() {
+        job.groups.clear();
+    }
     job.layers = layers;
     job.relief.background = Background::Clear;
     job.relief.depth_mm = depth_mm;

@@ -15,8 +15,7 @@ pub use shapes::{FINE, Shape, shapes};
 use super::measures::{Gauge, Measures};
 use crate::geom::{DVec2, Grid, Tolerance};
 use crate::job::{
-    Combine, Control, Join, LayerSpec, Profile, ScanShape, Scheme, Selector, SkeletonSpec,
-    SurfaceSpec,
+    Combine, Control, Join, LayerSpec, Profile, Scheme, Selector, SkeletonSpec, SurfaceSpec,
 };
 use crate::outline::{Figure, Region};
 use crate::relief::{rasterise, sampled};
@@ -215,7 +214,7 @@ pub enum Method {
     /// Inflated after Teddy.
     Teddy,
     /// Scan lines in so many directions.
-    Scanned(u32, ScanShape),
+    Scanned(u32, Profile),
     /// R-function.
     RFunction,
 }
@@ -237,8 +236,8 @@ impl Method {
         Self::Subdivided(Scheme::DooSabin, Control::Split),
         Self::Harmonic,
         Self::Profile,
-        Self::Scanned(1, ScanShape::Parabola),
-        Self::Scanned(8, ScanShape::Parabola),
+        Self::Scanned(1, Profile::Parabola),
+        Self::Scanned(8, Profile::Parabola),
         Self::Teddy,
         Self::RFunction,
     ];

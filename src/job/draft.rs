@@ -5,9 +5,10 @@ use std::io;
 use toml::de::{DeTable, DeValue};
 
 use super::error::{JobError, Source, shown};
+use super::group::{GroupSpec, read_groups};
 use super::keys::{
-    ARTWORK, AT, BACKGROUND, KEEP_OUT, LAYER, MACHINE, OPERATION, RELIEF, SAFETY, STOCK, TOLERANCE,
-    TOP, TRACE, TRACE_METHODS, WOOD, rule,
+    ARTWORK, AT, BACKGROUND, GROUP, KEEP_OUT, LAYER, MACHINE, OPERATION, RELIEF, SAFETY, STOCK,
+    TOLERANCE, TOP, TRACE, TRACE_METHODS, WOOD, rule,
 };
 use super::layer::{LayerDraft, read_color, read_layer};
 use super::library::{Library, read_machine, read_machine_file, read_wood};
@@ -38,6 +39,7 @@ pub struct Draft {
     pub(super) keep_outs: Vec<KeepOut>,
     pub(super) ramp_rad: f64,
     pub(super) layers: Vec<LayerDraft>,
+    pub(super) groups: Vec<GroupSpec>,
     pub(super) operations: Vec<OperationDraft>,
 }
 
@@ -139,6 +141,7 @@ fn read(
     let tolerance = read_tolerance(&or_empty("tolerance", &TOLERANCE)?)?;
     let safety = or_empty("safety", &SAFETY)?;
     let layers = top.tables("layer", &LAYER)?;
+    let groups = top.tables("group", &GROUP)?;
     let operations = top.tables("operation", &OPERATION)?;
     let keep_outs = top.tables("keep_out", &KEEP_OUT)?;
     let picture = artwork.is_picture();
@@ -181,6 +184,7 @@ fn read(
             })
             .collect(),
         layers: layers.iter().map(|table| read_layer(table, picture)).collect::<Result<_, _>>()?,
+        groups: read_groups(&groups, &layers)?,
         operations: if operations.is_empty() {
             default_operations(top.source, library)?
         } else {

@@ -139,7 +139,7 @@ pub(super) mod rule {
 pub(super) const ORIGINS: &[&str] =
     &["lower-left", "lower-right", "upper-left", "upper-right", "center"];
 /// Names of [`super::Profile`], in its order.
-pub(super) const PROFILES: &[&str] = &["parabola", "round", "chamfer", "cove", "ogee"];
+pub(super) const PROFILES: &[&str] = &["parabola", "round", "chamfer", "cove", "ogee", "bell"];
 /// Names of [`super::Combine`], in its order.
 pub(super) const COMBINES: &[&str] =
     &["base", "add", "max", "min", "subtract", "multiply", "replace"];
@@ -162,8 +162,6 @@ pub(super) const METHODS: &[&str] = &[
     "catmull-clark",
     "doo-sabin",
 ];
-/// Names of [`super::ScanShape`], in its order.
-pub(super) const SCAN_SHAPES: &[&str] = &["bell", "parabola"];
 /// Names of [`super::Control`], in its order.
 pub(super) const CONTROLS: &[&str] = &["even", "split", "quad4", "quad6"];
 /// Names of [`super::Prune`], in its order.
@@ -207,9 +205,9 @@ const fn key(name: &'static str, kind: Kind, default: Fallback, doc: &'static st
 use Fallback::{Flag, Number, Required, Rule, Text};
 
 /// The sections of a job, in the order in which they are written out.
-pub(super) static JOB: [&Section; 11] = [
+pub(super) static JOB: [&Section; 12] = [
     &TOP, &STOCK, &ARTWORK, &TRACE, &RELIEF, &TOLERANCE, &SAFETY, &KEEP_OUT, &LAYER, &SURFACE,
-    &OPERATION,
+    &GROUP, &OPERATION,
 ];
 
 /// Top level of a job.
@@ -249,6 +247,12 @@ pub(super) static TOP: Section = Section {
             Kind::Forms("[[layer]] tables"),
             Rule("one for each fill and each stroke colour, in paint order"),
             "the layers, bottom to top",
+        ),
+        key(
+            "group",
+            Kind::Forms("[[group]] tables"),
+            Rule("none"),
+            "layers that are merged first and then combined as one",
         ),
         key(
             "operation",
@@ -585,7 +589,7 @@ pub(super) static LAYER: Section = Section {
             "draft_deg",
             deg(0.0, 60.0),
             Number(0.0),
-            "slope of walls from the vertical (with base_mm > 0)",
+            "slope of walls from the vertical: where the outline (base_mm + offset_mm) stands off what is below",
         ),
         key(
             "slope_cap",
@@ -599,6 +603,38 @@ pub(super) static LAYER: Section = Section {
             Kind::Flag,
             Flag(false),
             "trim the layer to what the paint order leaves visible",
+        ),
+        key(
+            "group",
+            Kind::Text,
+            Rule("none: it joins what is below by itself"),
+            "name of the [[group]] that it is merged into first",
+        ),
+    ],
+};
+
+/// `[[group]]`
+pub(super) static GROUP: Section = Section {
+    name: "group",
+    header: "[[group]]",
+    doc: "layers next to each other that name it by `group` are merged first, on flat ground of their own; then \
+          the whole joins what is below, in the place of its layers",
+    keys: &[
+        key("name", Kind::Text, Required, "what its layers name it by"),
+        key("combine", Kind::Choice(COMBINES), Text("max"), "how the whole joins what is below"),
+        key(
+            "height_mm",
+            mm(0.0, 500.0),
+            Rule("none: it must be given for multiply"),
+            "multiply only: what is below is scaled by the group's height over this",
+        ),
+        key("offset_mm", mm(-500.0, 500.0), Number(0.0), "raises the whole group"),
+        key("blend_mm", mm(0.0, 100.0), Number(0.0), "radius of the soft seam for max and min"),
+        key(
+            "feather_mm",
+            mm(0.0, 100.0),
+            Number(0.0),
+            "width over which replace, add and subtract fade in from the outline of the whole",
         ),
     ],
 };
@@ -632,7 +668,7 @@ pub(super) static SURFACE: Section = Section {
             "profile",
             Kind::Choice(PROFILES),
             Text("parabola"),
-            "cross-section of the flank (ruled, ratio, harmonic, profile, r-function)",
+            "cross-section of the flank (all but patches and subdivision); teddy: by default round, scan-lines: bell",
         ),
         key(
             "radius_mm",
@@ -651,12 +687,6 @@ pub(super) static SURFACE: Section = Section {
             Kind::Whole { min: 1, max: 32 },
             Number(8.0),
             "scan-lines only: number of directions; 1 = rows along x, each by itself",
-        ),
-        key(
-            "shape",
-            Kind::Choice(SCAN_SHAPES),
-            Text("bell"),
-            "scan-lines only: cross-section, a normal distribution or the parabola",
         ),
         key(
             "levels",

@@ -11,7 +11,7 @@ use super::keys::{Key, LAYER, METHODS, PROFILES, SLOPE_CAP, SURFACE, rule};
 use super::reader::{Table, as_number};
 use super::settle::{TOUCHING_MM, round};
 use super::surface::{
-    Control, CrestSpec, Join, Profile, Prune, ScanShape, Scheme, Significance, SkeletonSpec, Split,
+    Control, CrestSpec, Join, Profile, Prune, Scheme, Significance, SkeletonSpec, Split,
     SubdivisionSpec, SurfaceSpec,
 };
 use super::types::{Combine, Found, FoundLayer, LayerSpec, Rgb, Selector};
@@ -89,19 +89,19 @@ impl Draft {
     /// A layer that stands by itself must not be asked to rise out of the stock, unless a later layer may
     /// lower it again. What the surfaces really reach is checked when they are made.
     fn check_heights(&self, layers: &[LayerSpec]) -> Result<(), JobError> {
+        let group_of = |index| self.groups.iter().find(|group| group.layers.contains(&index));
+        let stands = |combine| matches!(combine, Combine::Base | Combine::Max | Combine::Replace);
+        let lowers = |combine| !matches!(combine, Combine::Max | Combine::Add);
         for (index, layer) in layers.iter().enumerate() {
-            let alone = matches!(layer.combine, Combine::Base | Combine::Max | Combine::Replace);
-            let lowered = layers[index + 1..].iter().any(|later| {
-                matches!(
-                    later.combine,
-                    Combine::Min
-                        | Combine::Multiply
-                        | Combine::Subtract
-                        | Combine::Replace
-                        | Combine::Base
-                )
+            let group = group_of(index);
+            let alone = stands(layer.combine) && group.is_none_or(|group| stands(group.combine));
+            let lowered = (index + 1..layers.len()).any(|later| match group_of(later) {
+                Some(other) if group != Some(other) => lowers(other.combine),
+                _ => lowers(layers[later].combine),
             });
-            let top = layer.height_mm.max(layer.base_mm) + layer.offset_mm;
+            let top = layer.height_mm.max(layer.base_mm)
+                + layer.offset_mm
+                + group.map_or(0.0, |group| group.offset_mm);
             if alone && !lowered && top > self.depth_mm + TOUCHING_MM {
                 let message = format!(
                     "layer '{}' would rise {} mm above the stock: it is {} mm high, the background lies {} mm deep",
@@ -143,15 +143,7 @@ fn default_layer(select: Selector, name: String) -> LayerDraft {
 }
 
 fn layer(table: &Table<'_>, select: Selector, name: String) -> Result<LayerDraft, JobError> {
-    let combine = [
-        Combine::Base,
-        Combine::Add,
-        Combine::Max,
-        Combine::Min,
-        Combine::Subtract,
-        Combine::Multiply,
-        Combine::Replace,
-    ][table.choice("combine")];
+    let combine = combine_of(table);
     let height_mm = table.number("height_mm");
     let relative = matches!(combine, Combine::Add | Combine::Subtract | Combine::Multiply);
     if height_mm.is_none() && relative {
@@ -185,6 +177,11 @@ fn layer(table: &Table<'_>, select: Selector, name: String) -> Result<LayerDraft
         visible: table.flag("visible"),
     };
     Ok(LayerDraft { spec, height_mm })
+}
+
+/// How a layer or a group joins what is below it.
+pub(super) fn combine_of(table: &Table<'_>) -> Combine {
+    Combine::ALL[table.choice("combine")]
 }
 
 fn read_slope_cap(table: &Table<'_>) -> Result<f64, JobError> {
@@ -247,26 +244,31 @@ impl SurfaceSpec {
         let (source, nothing) = (Source::default(), DeTable::new());
         // The defaults go together.
         let mut other = surface_of(&Table::unchecked(&source, &SURFACE, &nothing), method).ok()?;
-        let flank = match self {
-            Self::Profile { profile, .. } | Self::RFunction { profile, .. } => *profile,
-            Self::ScanLines { .. } | Self::Teddy(_) => Profile::Parabola,
+        let own = match self {
+            Self::Profile { profile, .. }
+            | Self::RFunction { profile, .. }
+            | Self::ScanLines { profile, .. } => *profile,
             _ => self.crest().map_or(Profile::Parabola, |crest| crest.profile),
         };
-        match &mut other {
-            Self::Profile { profile, .. } | Self::RFunction { profile, .. } => *profile = flank,
-            _ => {}
+        let kept = own != usual_profile(self.method()) && uses(method, "profile");
+        let flank = if kept { own } else { usual_profile(method) };
+        if let Self::Profile { profile, .. }
+        | Self::RFunction { profile, .. }
+        | Self::ScanLines { profile, .. } = &mut other
+        {
+            *profile = flank;
         }
-        if let (Some(ours), Some(theirs)) = (self.crest(), other.crest_mut()) {
-            let join = theirs.skeleton.join;
-            let (profile, width_power) = (theirs.profile, theirs.width_power);
-            *theirs = ours.clone();
-            match method {
-                "teddy" => (theirs.profile, theirs.width_power) = (profile, width_power),
-                "patches" => (theirs.profile, theirs.skeleton.join) = (profile, join),
-                _ => theirs.profile = flank,
+        if let Some(theirs) = other.crest_mut() {
+            if let Some(ours) = self.crest() {
+                let (join, width_power) = (theirs.skeleton.join, theirs.width_power);
+                *theirs = ours.clone();
+                match method {
+                    "teddy" => theirs.width_power = width_power,
+                    "patches" => theirs.skeleton.join = join,
+                    _ => {}
+                }
             }
-        } else if let Some(crest) = other.crest_mut().filter(|_| method != "teddy") {
-            crest.profile = if method == "patches" { Profile::Parabola } else { flank };
+            theirs.profile = flank;
         }
         Some(other)
     }
@@ -277,12 +279,11 @@ fn uses(method: &str, key: &str) -> bool {
     let subdivides = Scheme::ALL.iter().any(|scheme| scheme.name() == method);
     match key {
         "method" => true,
-        "profile" => {
-            matches!(method, "ruled" | "ratio" | "harmonic" | "profile" | "r-function")
-        }
+        // Subdivision and the patches of the thesis have the cross-section that their rules give.
+        "profile" => method != "patches" && !subdivides,
         "radius_mm" => method == "profile",
         "order" => method == "r-function",
-        "directions" | "shape" => method == "scan-lines",
+        "directions" => method == "scan-lines",
         "width_power" if method == "teddy" => false,
         "levels" | "control" => subdivides,
         "adaptive_mm" => method == Scheme::Butterfly.name(),
@@ -293,11 +294,21 @@ fn uses(method: &str, key: &str) -> bool {
     }
 }
 
+/// The cross-section of a method that is given none.
+fn usual_profile(method: &str) -> Profile {
+    match method {
+        "teddy" => Profile::Round,
+        "scan-lines" => Profile::Bell,
+        _ => Profile::Parabola,
+    }
+}
+
 /// The surface of a method by the keys of its table, which are known to be its own.
 fn surface_of(table: &Table<'_>, method: &str) -> Result<SurfaceSpec, JobError> {
-    let profiles =
-        [Profile::Parabola, Profile::Round, Profile::Chamfer, Profile::Cove, Profile::Ogee];
-    let profile = profiles[table.choice("profile")];
+    let profile = match table.raw("profile") {
+        Some(_) => Profile::ALL[table.choice("profile")],
+        None => usual_profile(method),
+    };
     match method {
         "profile" => {
             return Ok(SurfaceSpec::Profile { profile, radius_mm: table.number("radius_mm") });
@@ -307,9 +318,8 @@ fn surface_of(table: &Table<'_>, method: &str) -> Result<SurfaceSpec, JobError> 
             return Ok(SurfaceSpec::RFunction { profile, order });
         }
         "scan-lines" => {
-            let shape = [ScanShape::Bell, ScanShape::Parabola][table.choice("shape")];
             let directions = table.sure_number("directions") as u32;
-            return Ok(SurfaceSpec::ScanLines { directions, shape });
+            return Ok(SurfaceSpec::ScanLines { directions, profile });
         }
         _ => {}
     }
@@ -327,9 +337,7 @@ fn surface_of(table: &Table<'_>, method: &str) -> Result<SurfaceSpec, JobError> 
     Ok(match method {
         "ratio" => SurfaceSpec::Ratio(crest),
         "harmonic" => SurfaceSpec::Harmonic(crest),
-        "teddy" => {
-            SurfaceSpec::Teddy(CrestSpec { profile: Profile::Round, width_power: 1.0, ..crest })
-        }
+        "teddy" => SurfaceSpec::Teddy(CrestSpec { width_power: 1.0, ..crest }),
         "patches" => {
             let skeleton =
                 SkeletonSpec { join: Join::Pairs, split: Split::Sleeves, ..crest.skeleton };

@@ -43,6 +43,7 @@ impl Draft {
             relief: ReliefSpec { pitch_mm, depth_mm: self.depth_mm, background },
             stock,
             layers,
+            groups: self.groups.clone(),
             operations,
             keep_outs: self.keep_outs.clone(),
             tolerance: self.tolerance,

@@ -34,8 +34,8 @@ pub enum SurfaceSpec {
     ScanLines {
         /// Number of directions; 1: rows along x, each by itself.
         directions: u32,
-        /// The cross-section.
-        shape: ScanShape,
+        /// The shape of the flank.
+        profile: Profile,
     },
     /// Patches of parabolas as in the thesis (method B, literal), for comparison with [`SurfaceSpec::Ruled`].
     Patches {
@@ -137,16 +137,6 @@ impl Default for CrestSpec {
             skeleton: SkeletonSpec::default(),
         }
     }
-}
-
-/// The cross-section of a surface by scan lines.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum ScanShape {
-    /// The normal distribution, cut where the outline is: a soft foot and a narrow crest.
-    Bell,
-    /// The parabola.
-    Parabola,
 }
 
 /// A subdivision scheme.
@@ -303,4 +293,12 @@ pub enum Profile {
     Cove,
     /// `3u^2 - 2u^3`
     Ogee,
+    /// A normal distribution about the ridge, cut at the outline and normalised: a soft foot and a narrow crest.
+    Bell,
+}
+
+impl Profile {
+    /// All of them.
+    pub const ALL: [Self; 6] =
+        [Self::Parabola, Self::Round, Self::Chamfer, Self::Cove, Self::Ogee, Self::Bell];
 }

@@ -505,12 +505,35 @@ fn subdivision_surfaces_and_patches_are_read_and_written() {
     }
     let surface = read("{ method = \"r-function\", profile = \"ogee\", order = 3 }");
     assert_eq!(surface, SurfaceSpec::RFunction { profile: Profile::Ogee, order: 3 });
-    let surface = read("{ method = \"scan-lines\", directions = 1, shape = \"parabola\" }");
-    assert_eq!(surface, SurfaceSpec::ScanLines { directions: 1, shape: ScanShape::Parabola });
+    let surface = read("{ method = \"scan-lines\", directions = 1, profile = \"parabola\" }");
+    assert_eq!(surface, SurfaceSpec::ScanLines { directions: 1, profile: Profile::Parabola });
     let surface = read("\"scan-lines\"");
-    assert_eq!(surface, SurfaceSpec::ScanLines { directions: 8, shape: ScanShape::Bell });
+    assert_eq!(surface, SurfaceSpec::ScanLines { directions: 8, profile: Profile::Bell });
     let SurfaceSpec::Teddy(crest) = read("\"teddy\"") else { panic!("it is inflated") };
     assert_eq!((crest.profile, crest.width_power), (Profile::Round, 1.0));
+    let fixed = ["patches"].into_iter().chain(Scheme::ALL.map(Scheme::name));
+    let fixed: Vec<&str> = fixed.collect();
+    for (index, word) in keys::PROFILES.iter().enumerate() {
+        let profile = Profile::ALL[index];
+        assert_eq!(serde_json::to_value(profile).unwrap(), *word);
+        for method in keys::METHODS.iter().filter(|method| !fixed.contains(method)) {
+            let surface = read(&format!("{{ method = \"{method}\", profile = \"{word}\" }}"));
+            assert_eq!(serde_json::to_value(&surface).unwrap()["profile"], *word, "{method}");
+            // Bells and coves are nobody's default but one's: they are kept by every other method that knows them.
+            let other = surface.by("ratio").unwrap();
+            if !["parabola", "round", "bell"].contains(word) {
+                assert_eq!(other.crest().unwrap().profile, profile, "{method}");
+            }
+        }
+    }
+    for method in fixed {
+        let text = format!(
+            "[[layer]]\nselect = \"all\"\nsurface = {{ method = \"{method}\", profile = \"round\" }}\n"
+        );
+        let error = job(&with(&text)).unwrap_err().to_string();
+        assert!(error.contains("does not use profile") && error.contains("\"teddy\""), "{error}");
+    }
+    assert_eq!(read("\"teddy\"").by("ruled").unwrap().crest().unwrap().profile, Profile::Parabola);
     let SurfaceSpec::Patches { ridge_true, crest } =
         read("{ method = \"patches\", ridge_true = true, width_power = 0.5 }")
     else {

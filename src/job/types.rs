@@ -1,5 +1,7 @@
 //! What a checked job is made of. Every value here is in range; lengths are mm, speeds mm/min.
 
+use super::group::GroupSpec;
+use super::keys::COMBINES;
 use super::surface::SurfaceSpec;
 use crate::geom::{Bounds, DVec2, DVec3, Tolerance};
 
@@ -18,6 +20,8 @@ pub struct Job {
     pub relief: ReliefSpec,
     /// The layers, bottom to top; never empty.
     pub layers: Vec<LayerSpec>,
+    /// Groups of layers that are merged first, in the order of their layers, which no two of them share.
+    pub groups: Vec<GroupSpec>,
     /// The operations in the order of work; never empty.
     pub operations: Vec<Operation>,
     /// Where nothing may be cut: clamps, screws, knots.
@@ -394,7 +398,7 @@ pub struct LayerSpec {
     pub blend_mm: f64,
     /// Width over which replace, add and subtract fade in from the outline, mm.
     pub feather_mm: f64,
-    /// Slope of walls from the vertical (with `base_mm` > 0), radians.
+    /// Slope of walls from the vertical, where the outline stands off what is below, radians.
     pub draft_rad: f64,
     /// Steepest slope (rise over run) that a narrow figure's flank may get; infinite = no cap.
     pub slope_cap: f64,
@@ -422,6 +426,24 @@ pub enum Combine {
     Multiply,
     /// `l`
     Replace,
+}
+
+impl Combine {
+    /// All of them.
+    pub const ALL: [Self; 7] = [
+        Self::Base,
+        Self::Add,
+        Self::Max,
+        Self::Min,
+        Self::Subtract,
+        Self::Multiply,
+        Self::Replace,
+    ];
+
+    /// Its name in job files.
+    pub fn name(self) -> &'static str {
+        COMBINES[self as usize]
+    }
 }
 
 /// One operation with its cutter and speeds, all known.

@@ -4,10 +4,11 @@ use std::fmt::Write as _;
 
 use super::draft::Draft;
 use super::error::JobError;
+use super::group::{GroupSpec, users_of};
 use super::keys::{
-    ARTWORK, BACKGROUND, COMBINES, CONTROLS, CUTTER, FOLLOWS, Fallback, JOB, JOINS, LAYER, MACHINE,
-    MILLINGS, OPERATION, ORIGINS, PATTERNS, PROFILES, PRUNES, RELIEF, SAFETY, SCAN_SHAPES, SPLITS,
-    STOCK, SURFACE, Section, TOLERANCE, TOP, TRACE, TRACE_METHODS, WOOD, rule,
+    ARTWORK, BACKGROUND, CONTROLS, CUTTER, FOLLOWS, Fallback, GROUP, JOB, JOINS, LAYER, MACHINE,
+    MILLINGS, OPERATION, ORIGINS, PATTERNS, PROFILES, PRUNES, RELIEF, SAFETY, SPLITS, STOCK,
+    SURFACE, Section, TOLERANCE, TOP, TRACE, TRACE_METHODS, WOOD, rule,
 };
 use super::library::Library;
 use super::surface::{Prune, SkeletonSpec, SurfaceSpec};
@@ -55,8 +56,14 @@ impl Job {
             ];
             section("[[keep_out]]", &lines);
         }
-        for layer in &self.layers {
-            section("[[layer]]", &layer_lines(layer, self.artwork.is_picture()));
+        for (index, layer) in self.layers.iter().enumerate() {
+            let mut lines = layer_lines(layer, self.artwork.is_picture());
+            let group = self.groups.iter().find(|group| group.layers.contains(&index));
+            lines.extend(group.map(|group| ("group", quoted(&group.name))));
+            section("[[layer]]", &lines);
+        }
+        for group in &self.groups {
+            section("[[group]]", &group_lines(group));
         }
         for operation in &self.operations {
             let mut lines = operation_lines(operation);
@@ -349,11 +356,11 @@ fn surface_lines(surface: &SurfaceSpec, of_picture: bool) -> Vec<Line> {
                 ("order", order.to_string()),
             ];
         }
-        SurfaceSpec::ScanLines { directions, shape } => {
+        SurfaceSpec::ScanLines { directions, profile } => {
             return vec![
                 ("method", quoted("scan-lines")),
+                ("profile", quoted(PROFILES[*profile as usize])),
                 ("directions", directions.to_string()),
-                ("shape", quoted(SCAN_SHAPES[*shape as usize])),
             ];
         }
         SurfaceSpec::Ruled(crest)
@@ -373,7 +380,6 @@ fn surface_lines(surface: &SurfaceSpec, of_picture: bool) -> Vec<Line> {
             lines.extend(own.adaptive_mm.map(|mm| ("adaptive_mm", number(mm))));
             lines.push(("control", quoted(CONTROLS[own.control as usize])));
         }
-        SurfaceSpec::Teddy(_) => {}
         _ => lines.push(("profile", quoted(PROFILES[crest.profile as usize]))),
     }
     // What differs from the defaults; the rest would bury it.
@@ -420,7 +426,7 @@ fn layer_lines(layer: &LayerSpec, of_picture: bool) -> Vec<Line> {
         ("base_mm", number(layer.base_mm)),
         ("height_mm", number(layer.height_mm)),
         ("offset_mm", number(layer.offset_mm)),
-        ("combine", quoted(COMBINES[layer.combine as usize])),
+        ("combine", quoted(layer.combine.name())),
         ("blend_mm", number(layer.blend_mm)),
         ("feather_mm", number(layer.feather_mm)),
         ("draft_deg", degrees(layer.draft_rad)),
@@ -428,6 +434,21 @@ fn layer_lines(layer: &LayerSpec, of_picture: bool) -> Vec<Line> {
         ("union", layer.union.to_string()),
         ("visible", layer.visible.to_string()),
     ]
+}
+
+/// What its way of combining makes use of.
+fn group_lines(group: &GroupSpec) -> Vec<Line> {
+    let mut lines = vec![
+        ("name", quoted(&group.name)),
+        ("combine", quoted(group.combine.name())),
+        ("height_mm", number(group.height_mm)),
+        ("offset_mm", number(group.offset_mm)),
+        ("blend_mm", number(group.blend_mm)),
+        ("feather_mm", number(group.feather_mm)),
+    ];
+    lines.retain(|(key, _)| users_of(key).is_empty() || users_of(key).contains(&group.combine));
+    debug_assert!(lines.iter().all(|(name, _)| GROUP.key(name).is_some()));
+    lines
 }
 
 /// All but the cutter, which is a name here and a table there.

@@ -69,6 +69,7 @@ pub(super) fn job(cutter: CutterSpec) -> Job {
         },
         relief: ReliefSpec { pitch_mm: 0.1, depth_mm: 2.0, background: Background::Clear },
         layers: vec![],
+        groups: vec![],
         operations: vec![Operation {
             kind: OperationKind::Raster { stepover: Stepover::Plan(0.4), angle_rad: 0.0 },
             cutter,

@@ -1,12 +1,13 @@
 use super::*;
 use crate::geom::{DVec3, Ring, Tolerance};
 use crate::job::{
-    ArtworkSpec, Fit, Machine, Origin, Place as At, Profile, ReliefSpec, Selector, Stock,
-    SurfaceSpec, TraceSpec, Wood,
+    ArtworkSpec, Fit, GroupSpec, LayerSpec, Machine, Origin, Place as At, Profile, ReliefSpec,
+    Selector, Stock, SurfaceSpec, TraceSpec, Wood,
 };
-use crate::outline::{OutlineLayer, Region};
-use crate::relief::grid_of;
-use crate::surface::{Mesh, raise_all};
+use crate::outline::{Figure, OutlineLayer, Region};
+use crate::relief::band::COVERAGE_ROUNDING;
+use crate::relief::{coverage, grid_of};
+use crate::surface::{Mesh, profile_at, raise_all};
 use proptest::prelude::*;
 use std::f64::consts::TAU;
 
@@ -53,6 +54,7 @@ fn job(layers: Vec<LayerSpec>) -> Job {
         },
         relief: ReliefSpec { pitch_mm: PITCH, depth_mm: 8.0, background: Background::Clear },
         layers,
+        groups: vec![],
         operations: vec![],
         keep_outs: Vec::new(),
         tolerance: Tolerance::default(),
@@ -480,6 +482,7 @@ fn the_number_of_threads_changes_nothing() {
         ..flat("l", 2.0, c)
     });
     let mut job = job(layers.to_vec());
+    job.groups = vec![GroupSpec { blend_mm: 0.5, ..group(1..3, Combine::Max) }];
     job.relief.background = Background::Leave(1.0);
     let art = outlines(vec![vec![ring(0.0), ring(2.0)], vec![ring(1.0)], vec![ring(3.0)]]);
     let bits = |threads| {
@@ -583,4 +586,292 @@ fn a_hole_with_a_height_of_its_own_has_it_all_round() {
     near(height(&relief, 7.25, 8.0), 0.3 * 2.0);
     // One outside, 0.1 mm from the outline: 0.025 mm are covered.
     near(height(&relief, 2.0, 8.0), 0.1 * 1.0);
+}
+
+/// The layers in `range` as a group that is joined by `combine`.
+fn group(range: std::ops::Range<usize>, combine: Combine) -> GroupSpec {
+    GroupSpec {
+        name: "group".into(),
+        layers: range,
+        offset_mm: 0.0,
+        combine,
+        height_mm: 0.0,
+        blend_mm: 0.0,
+        feather_mm: 0.0,
+    }
+}
+
+fn grouped(layers: Vec<LayerSpec>, groups: Vec<GroupSpec>) -> Job {
+    Job { groups, ..job(layers) }
+}
+
+#[test]
+fn a_group_is_merged_first_and_joins_as_tabled() {
+    // Within the group: 1 mm, and 2 mm more where the upper layer rides on it. c = 2 below, l = 3.
+    let table = [
+        (Combine::Base, 3.0, 1.0),
+        (Combine::Add, 5.0, 3.0),
+        (Combine::Max, 3.0, 2.0),
+        (Combine::Min, 2.0, 1.0),
+        (Combine::Subtract, -1.0, 1.0),
+        (Combine::Replace, 3.0, 1.0),
+        // Half of 6 mm, and a sixth.
+        (Combine::Multiply, 1.0, 1.0 / 3.0),
+    ];
+    let outlines = outlines(vec![
+        vec![rectangle(1.0, 1.0, 14.0, 14.0)],
+        vec![rectangle(5.0, 3.0, 14.0, 10.0)],
+        vec![rectangle(7.0, 5.0, 5.0, 6.0)],
+    ]);
+    for (combine, both, low) in table {
+        let layers = vec![
+            flat("below", 2.0, Combine::Max),
+            flat("blade", 1.0, Combine::Max),
+            flat("vein", 2.0, Combine::Add),
+        ];
+        let group = GroupSpec { height_mm: 6.0, ..group(1..3, combine) };
+        let relief = relief(&grouped(layers, vec![group]), &outlines).unwrap();
+        near(height(&relief, 8.0, 8.0), both);
+        near(height(&relief, 6.0, 8.0), low);
+        near(height(&relief, 3.0, 3.0), 2.0);
+        near(height(&relief, 0.25, 0.25), 0.0);
+        // Beyond the layer below the group stands on the ground.
+        let alone = match combine {
+            Combine::Min | Combine::Multiply => 0.0,
+            Combine::Subtract => -1.0,
+            _ => 1.0,
+        };
+        near(height(&relief, 17.0, 8.0), alone);
+    }
+}
+
+#[test]
+fn what_is_cut_within_a_group_does_not_cut_what_is_below() {
+    // A groove of 1 mm in a body of 3 mm over a plate of 2.5 mm: the plate shows in it when the body is merged first.
+    let outlines = outlines(vec![
+        vec![rectangle(1.0, 1.0, 14.0, 14.0)],
+        vec![rectangle(5.0, 5.0, 6.0, 6.0)],
+        vec![rectangle(3.0, 7.0, 10.0, 2.0)],
+    ]);
+    let layers = || {
+        vec![
+            flat("plate", 2.5, Combine::Max),
+            flat("body", 3.0, Combine::Max),
+            flat("groove", 1.0, Combine::Subtract),
+        ]
+    };
+    let apart = relief(&job(layers()), &outlines).unwrap();
+    near(height(&apart, 8.0, 8.0), 2.0);
+    near(height(&apart, 4.0, 8.0), 1.5);
+    let first = relief(&grouped(layers(), vec![group(1..3, Combine::Max)]), &outlines).unwrap();
+    near(height(&first, 8.0, 8.0), 2.5);
+    near(height(&first, 4.0, 8.0), 2.5);
+    near(height(&first, 8.0, 6.0), 3.0);
+}
+
+#[test]
+fn a_feather_of_a_group_fades_from_the_outline_of_the_whole() {
+    // Two halves with a common border at x = 8: a feather of each by itself would cut a groove there.
+    let outlines =
+        outlines(vec![vec![rectangle(4.0, 3.0, 4.0, 10.0)], vec![rectangle(8.0, 3.0, 4.0, 10.0)]]);
+    let layers = vec![flat("left", 4.0, Combine::Max), flat("right", 4.0, Combine::Max)];
+    let feathered = GroupSpec { feather_mm: 2.0, ..group(0..2, Combine::Add) };
+    let relief = relief(&grouped(layers, vec![feathered]), &outlines).unwrap();
+    for x in [7.5, 7.75, 8.0, 8.25, 8.5] {
+        near(height(&relief, x, 8.0), 4.0);
+    }
+    // 3x^2 - 2x^3 of a quarter, a half.
+    near(height(&relief, 4.5, 8.0), 4.0 * 0.15625);
+    near(height(&relief, 5.0, 8.0), 2.0);
+    near(height(&relief, 8.0, 4.0), 2.0);
+}
+
+#[test]
+fn a_seam_of_a_group_is_soft_against_what_is_below_but_not_within() {
+    let outlines = outlines(vec![
+        vec![rectangle(1.0, 1.0, 18.0, 14.0)],
+        vec![rectangle(4.0, 4.0, 6.0, 8.0)],
+        vec![rectangle(10.0, 4.0, 6.0, 8.0)],
+    ]);
+    let layers = ["below", "left", "right"].map(|name| flat(name, 2.0, Combine::Max)).to_vec();
+    let soft = GroupSpec { blend_mm: 1.0, ..group(1..3, Combine::Max) };
+    let relief = relief(&grouped(layers, vec![soft]), &outlines).unwrap();
+    // a = b is raised by k/4, right across the border of the halves, and not at all on the outline of the whole.
+    for x in [6.0, 9.75, 10.0, 10.25, 14.0] {
+        near(height(&relief, x, 8.0), 2.25);
+    }
+    near(height(&relief, 4.0, 8.0), 2.0);
+    near(height(&relief, 4.5, 8.0), 2.0 + 0.25 * 0.5);
+}
+
+#[test]
+fn the_offset_of_a_group_raises_it() {
+    let outlines = outlines(vec![vec![rectangle(4.0, 4.0, 8.0, 8.0)]]);
+    let raised = GroupSpec { offset_mm: 1.5, ..group(0..1, Combine::Max) };
+    let low = grouped(vec![flat("one", 2.0, Combine::Max)], vec![raised.clone()]);
+    near(height(&relief(&low, &outlines).unwrap(), 8.0, 8.0), 3.5);
+    let high = grouped(vec![flat("one", 7.0, Combine::Max)], vec![raised]);
+    let error = relief(&high, &outlines).unwrap_err();
+    assert!(error.to_string().contains("layer 'one' rises 0.500 mm"), "{error}");
+}
+
+#[test]
+fn groups_without_layers_of_their_own_are_refused() {
+    let outlines = outlines(vec![vec![rectangle(4.0, 4.0, 8.0, 8.0)]]);
+    for (first, second) in [(0..0, None), (0..2, None), (0..1, Some(0..1))] {
+        let ranges = [first].into_iter().chain(second);
+        let groups = ranges.map(|range| group(range, Combine::Max)).collect();
+        let error = relief(&grouped(vec![flat("one", 2.0, Combine::Max)], groups), &outlines);
+        assert!(matches!(error, Err(ReliefError::BadGroup { .. })));
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(24))]
+
+    /// Over bare ground a group of max, add and replace layers that keeps above 0 is what its layers are, however it is
+    /// joined there; and max of max is max, whatever lies below.
+    #[test]
+    fn a_group_over_bare_ground_changes_nothing(
+        boxes in prop::collection::vec((0.0..10.0, 0.0..8.0, 1.0..9.0, 1.0..7.0, 0.1..2.0_f64), 3),
+        ways in prop::collection::vec(0_usize..3, 3),
+        joint in 0_usize..3,
+        first in 0_usize..2,
+    ) {
+        let kinds = [Combine::Max, Combine::Add, Combine::Replace];
+        let outlines = outlines(boxes.iter().map(|b| vec![rectangle(b.0, b.1, b.2, b.3)]).collect());
+        let stack = |ways: &[usize]| -> Vec<LayerSpec> {
+            boxes.iter().zip(ways).map(|(b, &way)| flat("l", b.4, kinds[way])).collect()
+        };
+        let close = |a: &Relief, b: &Relief| {
+            a.target.z().iter().zip(b.target.z()).all(|(a, b)| (a - b).abs() < 1e-5)
+        };
+        let plain = relief(&job(stack(&ways)), &outlines).unwrap();
+        let whole = grouped(stack(&ways), vec![group(0..3, kinds[joint])]);
+        prop_assert!(close(&plain, &relief(&whole, &outlines).unwrap()));
+        let highest = relief(&job(stack(&[0; 3])), &outlines).unwrap();
+        let inner = grouped(stack(&[0; 3]), vec![group(first..first + 2, Combine::Max)]);
+        let nested = relief(&inner, &outlines).unwrap();
+        // Where cells are covered in part the order of means and maxima counts: nodes well inside or outside only.
+        let grid = *nested.target.grid();
+        let on_border = |k: usize| {
+            let p = grid.node(k % grid.nx, k / grid.nx);
+            boxes.iter().any(|b| {
+                let (q, size) = (p - DVec2::new(b.0, b.1), DVec2::new(b.2, b.3));
+                let d = q.min(size - q).min_element();
+                d.abs() < 1.5 * PITCH
+            })
+        };
+        for (k, (a, b)) in highest.target.z().iter().zip(nested.target.z()).enumerate() {
+            prop_assert!(on_border(k) || (a - b).abs() < 1e-5, "{a} {b}");
+        }
+    }
+}
+
+/// On a long band every method that goes by the way from the outline to the middle has exactly its cross-section.
+#[test]
+fn every_method_with_a_cross_section_shows_it_on_a_band() {
+    let outlines = outlines(vec![vec![rectangle(2.0, 6.0, 16.0, 4.0)]]);
+    for profile in Profile::ALL.into_iter().filter(|profile| *profile != Profile::Parabola) {
+        for method in ["ruled", "ratio", "harmonic", "teddy", "profile", "scan-lines"] {
+            let surface = SurfaceSpec::Profile { profile, radius_mm: None }.by(method).unwrap();
+            let spec = LayerSpec { surface, base_mm: 0.5, ..flat(method, 2.5, Combine::Max) };
+            let relief = relief(&job(vec![spec]), &outlines).unwrap();
+            // Teddy's crest goes by the width, which is largest across the corners at the ends.
+            let rise = if method == "teddy" { height(&relief, 10.0, 8.0) - 0.5 } else { 2.0 };
+            for k in 1..16 {
+                let y = 6.0 + f64::from(k) * PITCH;
+                let far = (y - 8.0).abs();
+                let exact = 0.5 + rise * profile_at(profile, 1.0 - far / 2.0);
+                // Samples of the spine of scan lines lie two cells apart: no node is further than one from the nearest.
+                let apart = if method == "scan-lines" { PITCH } else { 0.0 };
+                let lower = (2.0 - far) / (2.0 - far + libm::hypot(far, apart));
+                let tolerance = 0.012 + exact - 0.5 - rise * profile_at(profile, lower);
+                let got = height(&relief, 10.0, y);
+                assert!((got - exact).abs() < tolerance, "{method} {profile:?} {y}: {got} {exact}");
+            }
+        }
+    }
+}
+
+/// A plate of 3 mm under a layer with draft whose left side lies at x = 4.
+fn on_a_plate(spec: LayerSpec) -> Relief {
+    let plate = flat("plate", 3.0, Combine::Max);
+    let outlines = outlines(vec![
+        vec![rectangle(1.0, 1.0, 18.0, 14.0)],
+        vec![rectangle(4.0, 2.0, 12.0, 12.0)],
+    ]);
+    relief(&job(vec![plate, spec]), &outlines).unwrap()
+}
+
+#[test]
+fn walls_lean_by_their_draft_whatever_makes_them() {
+    // By how much each wall goes up or down from the plate (or, for max, from the background).
+    let layer =
+        |combine, base_mm, offset_mm| LayerSpec { offset_mm, ..flat("up", base_mm, combine) };
+    let table: [(LayerSpec, f64); 12] = [
+        (layer(Combine::Add, 2.0, 0.0), 2.0),
+        (layer(Combine::Add, 1.5, 0.5), 2.0),
+        (layer(Combine::Add, 0.0, -1.5), -1.5),
+        (layer(Combine::Subtract, 2.0, 0.0), -2.0),
+        (layer(Combine::Subtract, 1.0, -2.0), 1.0),
+        (layer(Combine::Replace, 1.0, 0.0), -2.0),
+        (layer(Combine::Replace, 4.0, 1.0), 2.0),
+        (layer(Combine::Base, 1.5, 0.0), -1.5),
+        (layer(Combine::Min, 1.0, 0.0), -2.0),
+        (layer(Combine::Min, 4.0, 0.0), 0.0),
+        // Half of the plate.
+        (layer(Combine::Multiply, 4.0, -2.0), -1.5),
+        (layer(Combine::Multiply, 4.0, 0.0), 0.0),
+    ];
+    for degrees in [45.0_f64, 30.0] {
+        let draft_rad = degrees.to_radians();
+        for (spec, wall) in &table {
+            let relief = on_a_plate(LayerSpec { draft_rad, ..spec.clone() });
+            for k in 0..24 {
+                let d = f64::from(k) * PITCH;
+                let rise = (d / libm::tan(draft_rad)).min(wall.abs());
+                let exact = 3.0 + wall.signum() * rise;
+                let got = height(&relief, 4.0 + d, 8.0);
+                assert!((got - exact).abs() < 1e-5, "{:?} {d}: {got} {exact}", spec.combine);
+            }
+            near(height(&relief, 3.5, 8.0), 3.0);
+        }
+    }
+}
+
+#[test]
+fn a_layer_that_stands_by_itself_leans_from_the_ground_up() {
+    // An outline 4 mm high, 1.5 of it by the offset, on ground and over a plate of 3 mm, at 45 degrees.
+    let spec = LayerSpec {
+        offset_mm: 1.5,
+        draft_rad: std::f64::consts::FRAC_PI_4,
+        ..flat("up", 2.5, Combine::Max)
+    };
+    let over = on_a_plate(spec.clone());
+    let outlines = outlines(vec![vec![rectangle(4.0, 2.0, 12.0, 12.0)]]);
+    let alone = relief(&job(vec![spec]), &outlines).unwrap();
+    for k in 0..24 {
+        let d = f64::from(k) * PITCH;
+        near(height(&alone, 4.0 + d, 8.0), d.min(4.0));
+        near(height(&over, 4.0 + d, 8.0), d.clamp(3.0, 4.0));
+    }
+}
+
+/// b(d) = b min(1, d / (b tan(draft))) for every method: on a flat surface nothing else is left.
+#[test]
+fn the_walls_of_every_method_have_their_draft() {
+    let outlines = outlines(vec![vec![rectangle(2.0, 2.0, 16.0, 12.0)]]);
+    for method in SurfaceSpec::METHODS {
+        let one = flat(method, 2.0, Combine::Max);
+        let surface = one.surface.by(method).unwrap();
+        let draft_rad = std::f64::consts::FRAC_PI_4;
+        let relief =
+            relief(&job(vec![LayerSpec { surface, draft_rad, ..one }]), &outlines).unwrap();
+        for k in 1..24 {
+            let d = f64::from(k) * PITCH;
+            let got = height(&relief, 2.0 + d, 8.0);
+            assert!((got - d.min(2.0)).abs() < 1e-5, "{method} {d}: {got}");
+        }
+    }
 }

@@ -5,7 +5,7 @@
 //!                                                                            \--fail--> ratio field
 //! ```
 
-use super::profile::{self, Flank};
+use super::profile::{self, Flank, lean, own_wall};
 use super::ridge::{Heights, Ridge};
 use super::rungs::{Rungs, rungs};
 use super::subdivide::{PolyMesh, adaptive, limit, subdivide};
@@ -355,8 +355,8 @@ fn levels(control: &PolyMesh, scheme: Scheme, cell_mm: f64) -> u32 {
     if scheme == Scheme::Sqrt3 { 2 * (levels / SQRT3_LEVELS).ceil() as u32 } else { levels as u32 }
 }
 
-/// Lowers a surface whose outline lies at its base to walls with the layer's draft: `b` becomes
-/// `min(b, d / tan(draft))` at distance d inside the outline. Upright walls stay as they are.
+/// Lowers a surface whose outline lies at its base to walls with the layer's draft ([`lean`] of [`own_wall`]). Upright
+/// walls stay as they are.
 pub fn lower_walls(
     patch: &mut Patch,
     regions: &[Region],
@@ -374,14 +374,17 @@ pub fn lower_walls(
         let base = ridge_of(layer, crest, region.holes.len() + 1).base_mm;
         region.rings().zip(base).collect::<Vec<_>>()
     });
-    for (ring, base_mm) in rings.filter(|(_, base)| *base > 0.0) {
+    let walls = rings.map(|(ring, base_mm)| (ring, own_wall(layer, base_mm)));
+    for (ring, wall_mm) in walls.filter(|(_, wall)| *wall != 0.0) {
         let mut lower: Vec<f32> =
             patch.z.iter().map(|z| if z.is_nan() { 0.0 } else { f32::NAN }).collect();
         let segments = Segments::of_rings([ring]);
-        let depth = |d: f64| (base_mm - d / draft).max(0.0) as f32;
-        segments.fill(grid, &window, base_mm * draft, &mut lower, f32::is_nan, depth);
-        // Beyond the reach of the wall nothing was filled in.
-        by.iter_mut().zip(lower).for_each(|(by, lower)| *by = by.max(lower));
+        let lacks = |d: f64| lean(wall_mm, d, draft) as f32;
+        segments.fill(grid, &window, wall_mm.abs() * draft, &mut lower, f32::is_nan, lacks);
+        // Beyond the reach of the wall nothing was filled in: NaN is not more.
+        for (by, lower) in by.iter_mut().zip(lower) {
+            *by = if lower.abs() > by.abs() { lower } else { *by };
+        }
     }
     patch.z.iter_mut().zip(by).for_each(|(z, by)| *z -= by);
 }

@@ -11,7 +11,7 @@
 use super::profile::{self, Flank, capped_height, profile_at, sample};
 use super::{Patch, Remark, Segments, Window, inscribed_radius, inside_spans, lower_walls};
 use crate::geom::{DVec2, Grid, Ring, Tolerance, distance_to_segment};
-use crate::job::{CrestSpec, LayerSpec, Profile, ScanShape, SurfaceSpec};
+use crate::job::{CrestSpec, LayerSpec, Profile, SurfaceSpec};
 use crate::outline::{Figure, Region};
 use rayon::prelude::*;
 use std::f64::consts::PI;
@@ -22,8 +22,6 @@ const SPACING_CELLS: f64 = 2.0;
 const LONGER: f64 = 1.05;
 /// And its distance to the outline at least this part of its half chord.
 const DISC: f64 = 0.85;
-/// Width of the normal distribution, in half chords.
-const SIGMA: f64 = 0.45;
 
 /// Foot and crest of a field, mm.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -69,7 +67,7 @@ fn raise_region(
     let inscribed = inscribed_radius(region, &segments, profile::RADIUS_CELLS * grid.pitch_mm);
     let wide = 2.0 * inscribed >= 3.0 * grid.pitch_mm && !window.is_empty();
     let flank = match layer.surface {
-        SurfaceSpec::RFunction { profile, .. } => profile,
+        SurfaceSpec::RFunction { profile, .. } | SurfaceSpec::ScanLines { profile, .. } => profile,
         _ => Profile::Parabola,
     };
     let LayerSpec { base_mm, height_mm: asked_mm, slope_cap, .. } = *layer;
@@ -79,8 +77,8 @@ fn raise_region(
         SurfaceSpec::RFunction { profile, order } if wide => {
             Some(r_function(region, order, tolerance.chord_mm, profile, rise, grid, &window))
         }
-        SurfaceSpec::ScanLines { directions, shape } if wide => {
-            let patch = scan_lines(region, directions, shape, rise, grid, &window);
+        SurfaceSpec::ScanLines { directions, profile } if wide => {
+            let patch = scan_lines(region, directions, profile, rise, grid, &window);
             if patch.is_none() {
                 remarks.push(Remark::NoMiddle { at: region.bounds().center() });
             }
@@ -182,33 +180,19 @@ fn joined(p: DVec2, edges: &[[DVec2; 2]], order: u32) -> f64 {
     }
 }
 
-/// The cross-section of a scanned surface, `u` from 0 on the outline to 1 on its crest.
-fn shape_at(shape: ScanShape, u: f64) -> f64 {
-    match shape {
-        ScanShape::Bell => bell(1.0 - u.clamp(0.0, 1.0)),
-        ScanShape::Parabola => profile_at(Profile::Parabola, u),
-    }
-}
-
-/// The normal distribution over 0..=1, cut and normalised: 1 at 0, 0 at 1.
-fn bell(t: f64) -> f64 {
-    let foot = libm::exp(-1.0 / (2.0 * SIGMA * SIGMA));
-    (libm::exp(-t * t / (2.0 * SIGMA * SIGMA)) - foot) / (1.0 - foot)
-}
-
 /// Heights by scan lines in so many `directions` at the nodes inside the region, NaN outside; `None` where no middle of a
 /// line counts.
 pub fn scan_lines(
     region: &Region,
     directions: u32,
-    shape: ScanShape,
+    profile: Profile,
     rise: Rise,
     grid: &Grid,
     window: &Window,
 ) -> Option<Patch> {
     let edges = edges_of(region);
     if directions <= 1 {
-        return Some(along_rows(region, &edges, shape, rise, grid, window));
+        return Some(along_rows(region, &edges, profile, rise, grid, window));
     }
     let outline = Segments::of_rings(region.rings());
     let kept = middles(&edges, directions, &outline, SPACING_CELLS * grid.pitch_mm);
@@ -226,7 +210,7 @@ pub fn scan_lines(
     for (z, (d_b, d_s)) in patch.z.iter_mut().zip(to_outline.into_iter().zip(to_spine)) {
         let (d_b, d_s) = (f64::from(d_b), f64::from(d_s));
         if !d_s.is_nan() {
-            *z = rise.at(shape_at(shape, if d_b > 0.0 { d_b / (d_b + d_s) } else { 0.0 }));
+            *z = rise.at(profile_at(profile, if d_b > 0.0 { d_b / (d_b + d_s) } else { 0.0 }));
         }
     }
     Some(patch)
@@ -236,7 +220,7 @@ pub fn scan_lines(
 fn along_rows(
     region: &Region,
     edges: &[[DVec2; 2]],
-    shape: ScanShape,
+    profile: Profile,
     rise: Rise,
     grid: &Grid,
     window: &Window,
@@ -256,7 +240,7 @@ fn along_rows(
                 let (middle, half) = (0.5 * (pair[0] + pair[1]), 0.5 * (pair[1] - pair[0]));
                 if half > 0.0 { 1.0 - (x - middle).abs() / half } else { 0.0 }
             });
-            z[i] = rise.at(shape_at(shape, u));
+            z[i] = rise.at(profile_at(profile, u));
         }
     });
     patch

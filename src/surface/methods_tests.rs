@@ -3,9 +3,7 @@
 use super::figures_tests::{Noise, blob, raise_region};
 use super::*;
 use crate::geom::DVec2;
-use crate::job::{
-    Control, CrestSpec, Join, Profile, ScanShape, Scheme, SkeletonSpec, SubdivisionSpec,
-};
+use crate::job::{Control, CrestSpec, Join, Profile, Scheme, SkeletonSpec, SubdivisionSpec};
 
 fn subdivision(scheme: Scheme, control: Control) -> SurfaceSpec {
     let crest = CrestSpec::default();
@@ -81,8 +79,8 @@ fn fields_are_raised() {
     raised_with_fallbacks(&SurfaceSpec::Harmonic(CrestSpec::default()), 0);
     raised_with_fallbacks(&SurfaceSpec::RFunction { profile: Profile::Parabola, order: 2 }, 0);
     for directions in [1, 8] {
-        let shape = ScanShape::Bell;
-        raised_with_fallbacks(&SurfaceSpec::ScanLines { directions, shape }, 0);
+        let profile = Profile::Bell;
+        raised_with_fallbacks(&SurfaceSpec::ScanLines { directions, profile }, 0);
     }
     let crest = CrestSpec { profile: Profile::Round, width_power: 1.0, ..CrestSpec::default() };
     raised_with_fallbacks(&SurfaceSpec::Teddy(crest), 0);

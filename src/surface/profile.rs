@@ -13,7 +13,7 @@
 
 use super::{FINE_ROWS, Patch, Remark, Segments, Window, averaged, inscribed_radius, inside_spans};
 use crate::geom::Grid;
-use crate::job::{LayerSpec, Profile};
+use crate::job::{Combine, LayerSpec, Profile};
 use crate::outline::{Figure, Region};
 
 /// How exactly the inscribed radius is found, in cells.
@@ -31,18 +31,32 @@ pub fn profile_at(profile: Profile, u: f64) -> f64 {
         Profile::Chamfer => u,
         Profile::Cove => 1.0 - (1.0 - u * u).sqrt(),
         Profile::Ogee => u * u * (3.0 - 2.0 * u),
+        Profile::Bell => bell(1.0 - u),
     }
 }
 
+/// Width of the normal distribution of a bell, in half widths.
+const SIGMA: f64 = 0.45;
+
+/// The normal distribution over 0..=1, cut and normalised: 1 at 0, 0 at 1.
+fn bell(t: f64) -> f64 {
+    let foot = libm::exp(-1.0 / (2.0 * SIGMA * SIGMA));
+    (libm::exp(-t * t / (2.0 * SIGMA * SIGMA)) - foot) / (1.0 - foot)
+}
+
+/// Steepest slope of a bell: `exp(-1/2) / (sigma (1 - e))`, e what the distribution has at the outline.
+const BELL_STEEPNESS: f64 = 1.472_505;
+
 /// Nominal steepness of a profile: its slope in units of height over radius that the slope cap goes by.
 ///
-/// Parabola 2 and chamfer 1 at the foot, ogee 1.5 half way up; round (at the foot) and cove (at the
+/// Parabola 2 and chamfer 1 at the foot, ogee 1.5 half way up, bell 1.4725 one sigma from the ridge; round (at the foot) and cove (at the
 /// ridge) are vertical at one point and count as the parabola that they resemble elsewhere.
 fn steepness(profile: Profile) -> f64 {
     match profile {
         Profile::Parabola | Profile::Round | Profile::Cove => 2.0,
         Profile::Chamfer => 1.0,
         Profile::Ogee => 1.5,
+        Profile::Bell => BELL_STEEPNESS,
     }
 }
 
@@ -59,7 +73,7 @@ pub fn smooth_cap(x: f64) -> f64 {
 
 /// Height of the ridge under the slope cap, mm: `b + (H - b) phi(x)` with
 /// `x = slope_cap * R / (c (H - b))` and c the nominal steepness of the profile (parabola, round, cove
-/// 2, ogee 1.5, chamfer 1). A region so narrow that its flank would be steeper gets a lower ridge.
+/// 2, ogee 1.5, bell 1.47, chamfer 1). A region so narrow that its flank would be steeper gets a lower ridge.
 /// An infinite `slope_cap` leaves the height alone; a height below the base counts as the base.
 pub fn capped_height(
     base_mm: f64,
@@ -75,9 +89,30 @@ pub fn capped_height(
     base_mm + rise * smooth_cap(slope_cap * radius_mm / (steepness(profile) * rise))
 }
 
-/// Height of a layer's surface on its outline, mm: its base, or 0 where the wall has a draft.
+/// The wall that the draft of a layer leans within its surface, over an outline of height `base_mm`: how high it stands,
+/// mm, negative where it goes down; 0 for an upright wall.
+///
+/// The surface of a layer that stands by itself rises from the ground, one that is added or subtracted from what is below.
+/// Walls of the others reach from what is below to the layer: they are leaned when it is joined.
+pub fn own_wall(layer: &LayerSpec, base_mm: f64) -> f64 {
+    let step_mm = base_mm + layer.offset_mm;
+    match layer.combine {
+        _ if layer.draft_rad <= 0.0 => 0.0,
+        Combine::Max => step_mm.max(0.0),
+        Combine::Add | Combine::Subtract => step_mm,
+        Combine::Base | Combine::Min | Combine::Replace | Combine::Multiply => 0.0,
+    }
+}
+
+/// What a wall of this height (negative: downwards) lacks at distance `d` inside its outline when its run over its rise
+/// is `draft`: so `b` becomes `b min(1, d / (b draft))`.
+pub fn lean(wall_mm: f64, d: f64, draft: f64) -> f64 {
+    if wall_mm == 0.0 { 0.0 } else { wall_mm.signum() * (wall_mm.abs() - d / draft).max(0.0) }
+}
+
+/// Height of a layer's surface on its outline, mm: its base, less the wall that leans within it.
 pub fn outline_height(layer: &LayerSpec) -> f64 {
-    if layer.base_mm > 0.0 && layer.draft_rad > 0.0 { 0.0 } else { layer.base_mm }
+    layer.base_mm - own_wall(layer, layer.base_mm)
 }
 
 /// All that shapes the flank of one region.
@@ -89,7 +124,8 @@ pub(super) struct Flank {
     /// `None`: the inscribed radius of the region.
     radius_mm: Option<f64>,
     slope_cap: f64,
-    /// Run over rise of a wall; 0 = upright.
+    /// Height of the wall that leans, and its run over its rise.
+    wall_mm: f64,
     draft: f64,
 }
 
@@ -102,18 +138,15 @@ impl Flank {
             height_mm: layer.height_mm,
             radius_mm,
             slope_cap: layer.slope_cap,
+            wall_mm: own_wall(layer, layer.base_mm),
             draft: libm::tan(layer.draft_rad),
         }
     }
 
     /// Height at distance `d` inside the outline, mm, under a ridge of `ridge_mm` and bevel `radius_mm`.
     fn at(&self, d: f64, ridge_mm: f64, radius_mm: f64) -> f64 {
-        let wall = if self.base_mm > 0.0 && self.draft > 0.0 {
-            self.base_mm.min(d / self.draft)
-        } else {
-            self.base_mm
-        };
-        wall + (ridge_mm - self.base_mm) * profile_at(self.profile, d / radius_mm)
+        let foot = self.base_mm - lean(self.wall_mm, d, self.draft);
+        foot + (ridge_mm - self.base_mm) * profile_at(self.profile, d / radius_mm)
     }
 }
 

@@ -44,9 +44,27 @@ fn heights(figure: &Figure, layer: &LayerSpec, grid: &Grid) -> Patch {
 }
 
 #[test]
+fn the_bell_is_as_tabled() {
+    for (t, tabled) in [(0.0, 1.0), (0.25, 0.843771), (0.5, 0.496808), (0.75, 0.179926), (1.0, 0.0)]
+    {
+        assert!((profile_at(Profile::Bell, 1.0 - t) - tabled).abs() < 1e-6);
+    }
+}
+
+#[test]
+fn the_nominal_steepness_of_smooth_profiles_is_their_steepest_slope() {
+    let n = 10_000;
+    for profile in [Profile::Parabola, Profile::Chamfer, Profile::Ogee, Profile::Bell] {
+        let at = |k: u32| profile_at(profile, f64::from(k) / f64::from(n));
+        let steepest = (0..n).map(|k| (at(k + 1) - at(k)) * f64::from(n)).fold(0.0, f64::max);
+        assert!((steepest - steepness(profile)).abs() < 2e-4, "{profile:?} {steepest}");
+    }
+}
+
+#[test]
 fn profiles_have_their_values() {
     let close = |p, u, f: f64| assert!((profile_at(p, u) - f).abs() < 1e-12, "{p:?} {u}");
-    for p in [Profile::Parabola, Profile::Round, Profile::Chamfer, Profile::Cove, Profile::Ogee] {
+    for p in Profile::ALL {
         close(p, 0.0, 0.0);
         close(p, 1.0, 1.0);
         close(p, 3.0, 1.0);

@@ -72,7 +72,8 @@ fn parts(longest: f64, ridge: &Ridge, density: &Density) -> usize {
     let sag = match ridge.profile {
         Profile::Parabola | Profile::Chamfer => 0.25,
         Profile::Round | Profile::Cove => PI * PI / 32.0,
-        Profile::Ogee => 0.75,
+        // The bell bends at its ridge, by 5.4.
+        Profile::Ogee | Profile::Bell => 0.75,
     };
     let useful = (sag * rise / density.max_facet_mm).sqrt().ceil();
     let wanted = (longest / density.spacing_mm).ceil();
@@ -88,7 +89,7 @@ fn levels(profile: Profile, parts: usize) -> Vec<f64> {
             _ if k == 0 || k == parts => x,
             Profile::Round => 1.0 - libm::cos(x * FRAC_PI_2),
             Profile::Cove => libm::sin(x * FRAC_PI_2),
-            Profile::Parabola | Profile::Chamfer | Profile::Ogee => x,
+            Profile::Parabola | Profile::Chamfer | Profile::Ogee | Profile::Bell => x,
         }
     };
     (0..=parts).map(level).collect()

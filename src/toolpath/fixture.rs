@@ -72,6 +72,7 @@ pub(crate) fn job(
         },
         relief: ReliefSpec { pitch_mm, depth_mm: 5.0, background: Background::Clear },
         layers: vec![layer],
+        groups: vec![],
         operations,
         keep_outs: Vec::new(),
         tolerance: Tolerance::default(),

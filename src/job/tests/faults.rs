@@ -463,3 +463,54 @@ fn settings_of_a_picture_have_their_faults() {
     let size = "[artwork]\nfile = \"a.png\"\nwidth_mm = 100\ndpi = 300\n";
     refused(size, twice, (4, 7), &["size is given twice", "`dpi`"]);
 }
+
+#[test]
+fn groups_that_do_not_fit_their_layers_are_refused_where_they_stand() {
+    let layer = |group: &str| format!("[[layer]]\nselect = \"all\"\nheight_mm = 1\n{group}\n");
+    let leaf = layer("group = \"leaf\"");
+    let text = |layers: &str, groups: &str| with(&format!("{layers}{groups}"));
+    let named = |e: &JobError| matches!(e, JobError::UnknownName(_));
+    let clash = |e: &JobError| matches!(e, JobError::Impossible(_));
+    let lacks = |e: &JobError| matches!(e, JobError::Missing(_));
+    // Artwork: lines 1 and 2; a layer: four lines.
+    refused(&text(&leaf, ""), named, (6, 9), &["no group \"leaf\"", "[[group]]"]);
+    let other = "[[group]]\nname = \"leaves\"\n";
+    refused(&text(&leaf, other), named, (6, 9), &["did you mean \"leaves\"?", "there is: leaves"]);
+    let group = "[[group]]\nname = \"leaf\"\n";
+    refused(&text(&layer(""), group), clash, (8, 8), &["no layer belongs to group \"leaf\""]);
+    let twice = format!("{group}{group}");
+    refused(&text(&leaf, &twice), clash, (10, 8), &["two groups called \"leaf\""]);
+    let apart = format!("{leaf}{}{leaf}", layer(""));
+    refused(&text(&apart, group), clash, (14, 9), &["do not stand together", "move this one"]);
+    refused(&text(&leaf, "[[group]]\ncombine = \"add\"\n"), lacks, (7, 1), &["`name`"]);
+    for (lines, place, words) in [
+        ("blend_mm = 1\ncombine = \"add\"\n", (9, 12), "\"max\", \"min\""),
+        ("feather_mm = 1\n", (9, 14), "combined by max does not use feather_mm"),
+        ("height_mm = 3\n", (9, 13), "it belongs to combine = \"multiply\""),
+        ("combine = \"multiply\"\n", (9, 11), "needs height_mm above 0"),
+        ("combine = \"multiply\"\nheight_mm = 0\n", (10, 13), "needs height_mm above 0"),
+    ] {
+        refused(&text(&leaf, &format!("{group}{lines}")), clash, place, &[words]);
+    }
+    let open = "[[layer]]\nselect = \"all\"\ngroup = \"leaf\"\n";
+    let add = format!("{group}combine = \"add\"\n");
+    refused(&text(open, &add), lacks, (5, 9), &["combined by add needs height_mm"]);
+    let table = text("[layer.group]\n", "");
+    assert!(job(&table).is_err());
+}
+
+#[test]
+fn a_group_that_stands_out_of_the_stock_is_told_unless_it_rides_or_is_lowered() {
+    let stack = |group: &str, last: &str| {
+        with(&format!(
+            "[relief]\ndepth_mm = 5\n[[layer]]\nselect = \"all\"\nheight_mm = 4\ngroup = \"g\"\n{last}\
+             [[group]]\nname = \"g\"\n{group}\n"
+        ))
+    };
+    let kind = |e: &JobError| matches!(e, JobError::Impossible(_));
+    refused(&stack("offset_mm = 2", ""), kind, (7, 13), &["rise 1 mm above the stock"]);
+    assert!(job(&stack("offset_mm = 1", "")).is_ok());
+    assert!(job(&stack("offset_mm = 2\ncombine = \"subtract\"", "")).is_ok());
+    let lower = "[[layer]]\nselect = \"all\"\nheight_mm = 1\ncombine = \"min\"\n";
+    assert!(job(&stack("offset_mm = 2", lower)).is_ok());
+}

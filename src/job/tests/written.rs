@@ -299,3 +299,44 @@ fn settings_of_a_picture_are_written_and_come_back() {
     let text = template("lotus.svg", &found(), &library).unwrap();
     assert!(!text.contains("trace") && !text.contains("dpi"), "{text}");
 }
+
+#[test]
+fn a_group_is_written_as_it_is_read_with_what_its_way_of_joining_uses() {
+    let layer = |group: &str| format!("[[layer]]\nselect = \"all\"\nheight_mm = 1\n{group}");
+    // The groups stand in another order than their layers.
+    let text = with(&format!(
+        "{}{}{}{}[[group]]\nname = \"fruit\"\ncombine = \"multiply\"\nheight_mm = 2.5\noffset_mm = -0.5\n\
+         [[group]]\nname = \"leaf \\\"a\\\"\"\nblend_mm = 0.3\n",
+        layer(""),
+        layer("group = \"leaf \\\"a\\\"\"\n"),
+        layer("group = \"leaf \\\"a\\\"\"\n"),
+        layer("group = \"fruit\"\n"),
+    ));
+    let first = job(&text).unwrap();
+    let leaf = GroupSpec {
+        name: "leaf \"a\"".into(),
+        layers: 1..3,
+        offset_mm: 0.0,
+        combine: Combine::Max,
+        height_mm: 0.0,
+        blend_mm: 0.3,
+        feather_mm: 0.0,
+    };
+    let fruit = GroupSpec {
+        name: "fruit".into(),
+        layers: 3..4,
+        offset_mm: -0.5,
+        combine: Combine::Multiply,
+        height_mm: 2.5,
+        blend_mm: 0.0,
+        feather_mm: 0.0,
+    };
+    assert_eq!(first.groups, [leaf, fruit]);
+    let written = first.to_toml();
+    let second = job(&written).unwrap();
+    assert_eq!(second.groups, first.groups);
+    assert_eq!(second.to_toml(), written);
+    let of_leaf = written.split("[[group]]").nth(1).unwrap();
+    assert!(of_leaf.contains("blend_mm = 0.3") && !of_leaf.contains("feather_mm"), "{of_leaf}");
+    assert!(job(&with("")).unwrap().groups.is_empty());
+}
