@@ -12,7 +12,7 @@
 
 use super::emit::Emitter;
 use super::left::Surfaces;
-use super::pencil::pencil;
+use super::pencil::{pencil, touch_up};
 use super::quicker::outlines_are_quicker;
 use super::raster::{First, Passes, clear_deep_wood, passes, passes_where_wood_is_left};
 use super::trace::LEAST_ROUNDING_MM;
@@ -101,6 +101,9 @@ pub(super) fn finish(
         let (stepover_mm, angle_rad) = (closer * stepover_mm, angle_rad + turn);
         let across = Passes { stepover_mm, angle_rad, only: Some(&left) };
         passes(site, &across, block, out)?;
+    }
+    if let Some(left) = left(block) {
+        touch_up(site, &left, block, out);
     }
     Ok(())
 }

@@ -48,29 +48,53 @@ pub(super) fn pencil(
     block: &mut Block,
     out: &mut Emitter,
 ) {
-    let profile = Profile::of(&site.operation.cutter);
-    let rolled = profile.rolled(LEAST_ROUNDING_MM);
-    let dropper = Dropper::new(site.target, rolled.clone());
     let grid = site.target.grid();
-    let drop = |p: DVec2| dropper.drop(p);
-    let tracer = Tracer::new(drop, rolled, grid.pitch_mm, site.job.tolerance.fit_mm);
-
     let radius = (0.5 * TOGETHER * stepover_mm / grid.pitch_mm).max(1.5);
     let mask = Mask::around(left.axes(), radius, grid.nx, grid.ny);
     let lines = mask.middle_lines((radius + DEEPER).min(f64::from(u8::MAX)) as u8, SHORTEST);
-    let stock = site.job.stock.bounds();
-    let on_line = |line: &Vec<usize>| {
+    let way = |line: &Vec<usize>, drop: &dyn Fn(DVec2) -> f64| {
         let way = match line[..] {
             [node] => through(grid.node(node % grid.nx, node / grid.nx), grid.pitch_mm, drop),
             _ => smooth(line, grid),
         };
-        let way = in_crease(&way, grid.pitch_mm, drop);
+        in_crease(&way, grid.pitch_mm, drop)
+    };
+    follow(site, left, &lines, way, block, out);
+}
+
+/// Plans a short pass through each place that the axis still has to pass by: on steep ground only the very place will do.
+/// As [`pencil`] otherwise.
+pub(super) fn touch_up(site: &Site, left: &Left, block: &mut Block, out: &mut Emitter) {
+    let grid = site.target.grid();
+    let way = |&node: &usize, drop: &dyn Fn(DVec2) -> f64| {
+        through(grid.node(node % grid.nx, node / grid.nx), grid.pitch_mm, drop)
+    };
+    follow(site, left, left.axes(), way, block, out);
+}
+
+/// Cuts along the ways in plan that `way` makes of places, over what the exact drop says there.
+fn follow<T: Sync>(
+    site: &Site,
+    left: &Left,
+    places: &[T],
+    way: impl Fn(&T, &dyn Fn(DVec2) -> f64) -> Vec<DVec2> + Sync,
+    block: &mut Block,
+    out: &mut Emitter,
+) {
+    let profile = Profile::of(&site.operation.cutter);
+    let rolled = profile.rolled(LEAST_ROUNDING_MM);
+    let dropper = Dropper::new(site.target, rolled.clone());
+    let drop = |p: DVec2| dropper.drop(p);
+    let (pitch_mm, fit_mm) = (site.target.grid().pitch_mm, site.job.tolerance.fit_mm);
+    let tracer = Tracer::new(drop, rolled, pitch_mm, fit_mm);
+    let stock = site.job.stock.bounds();
+    let spans = |place: &T| {
+        let way = way(place, &drop);
         let inside: Vec<DVec2> = way.into_iter().filter(|p| stock.contains(*p)).collect();
         let plans = if inside.len() > 1 { chords(&inside, PLAN_FIT_MM, |_| true) } else { vec![] };
         plans.iter().flat_map(|plan| along(site, Some(left), plan, &tracer)).collect::<Vec<_>>()
     };
-    let spans = lines.par_iter().flat_map_iter(on_line).collect();
-    let spans = vec![spans];
+    let spans = vec![places.par_iter().flat_map_iter(spans).collect()];
     out.note_deep_pass(deepest_pass_mm(&spans, block, site.operation.cutter.working_mm()));
     let travel = Travel::new(site.job, site.operation, block);
     let spans = nearest_first(spans.into_iter().flatten().collect());
@@ -79,7 +103,7 @@ pub(super) fn pencil(
 }
 
 /// A short way through a place, in that of four directions in which the tip climbs least.
-fn through(at: DVec2, pitch_mm: f64, drop: impl Fn(DVec2) -> f64) -> Vec<DVec2> {
+fn through(at: DVec2, pitch_mm: f64, drop: &dyn Fn(DVec2) -> f64) -> Vec<DVec2> {
     let mut best = (f64::INFINITY, DVec2::X);
     for way in [(1.0, 0.0), (1.0, 1.0), (0.0, 1.0), (-1.0, 1.0)] {
         let by = DVec2::from(way).normalize() * (BEYOND * pitch_mm);
@@ -120,7 +144,7 @@ fn smooth(line: &[usize], grid: &Grid) -> Vec<DVec2> {
 }
 
 /// The way moved to the lowest tip across it; where that is at the rim of the search it is no crease, and stays.
-fn in_crease(way: &[DVec2], pitch_mm: f64, drop: impl Fn(DVec2) -> f64) -> Vec<DVec2> {
+fn in_crease(way: &[DVec2], pitch_mm: f64, drop: &dyn Fn(DVec2) -> f64) -> Vec<DVec2> {
     let most = ACROSS * pitch_mm;
     let last = way.len() - 1;
     let place = |k: usize| {
@@ -181,7 +205,7 @@ mod tests {
             };
             let line: Vec<usize> = (5..50).map(node).collect();
             let drop = |p: DVec2| (p.y - crease(p.x)).abs();
-            for p in in_crease(&smooth(&line, &grid), grid.pitch_mm, drop) {
+            for p in in_crease(&smooth(&line, &grid), grid.pitch_mm, &drop) {
                 prop_assert!(drop(p) < 2.0 * PLACE_MM, "{} at {p}", drop(p));
             }
         }
