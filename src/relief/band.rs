@@ -1,5 +1,5 @@
 //! A band of rows on its way through the layers: coverage, heights and distances of each layer in turn, joined to what
-//! is below it (the formulas stand in [`super::merge`]).
+//! is below it (the formulas stand in [`mod@super::merge`]).
 
 use super::combine::{feather_weight, joined};
 use super::coverage::{coverage, samples};
