@@ -1,4 +1,6 @@
 //! What a checked job is made of. Every value here is in range; lengths are mm, speeds mm/min.
+//!
+//! Long because it is one vocabulary: plain types with a line on each field, and hardly any code.
 
 use super::group::GroupSpec;
 use super::keys::COMBINES;

@@ -1,3 +1,5 @@
+//! Laws and tabled values of merging. Long because all of it stands on the same small layers and jobs, which are made here.
+
 use super::*;
 use crate::geom::{DVec3, Ring, Tolerance};
 use crate::job::{
