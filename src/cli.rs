@@ -12,6 +12,7 @@ mod new;
 mod observe;
 mod outcome;
 mod ports;
+mod simulate;
 mod stream;
 mod surfaces;
 mod tables;
@@ -53,6 +54,8 @@ enum Command {
     New(new::Args),
     /// Compare all surface methods over artwork: pictures, cross-sections and figures side by side
     Surfaces(surfaces::Args),
+    /// Dry run of any programs: what they cut, what they miss, what they would break
+    Simulate(simulate::Args),
     /// Tell how long a program takes on a machine, by GRBL's own planner
     Time(time::Args),
     /// Send a program to a GRBL router, a network controller or the simulation, and watch over it
@@ -109,6 +112,7 @@ pub fn main() -> ExitCode {
         Command::Check(args) => check::run(&args),
         Command::New(args) => new::run(&args),
         Command::Surfaces(args) => surfaces::run(&args),
+        Command::Simulate(args) => simulate::run(&args),
         Command::Time(args) => time::run(&args),
         Command::Stream(args) => stream::run(&args),
         Command::Ports(args) => ports::run(&args),

@@ -21,7 +21,7 @@ mod simd;
 
 pub use drop::Dropper;
 pub use field::{closing, tip_field};
-pub use reach::reach;
+pub use reach::{reach, reach_of};
 
 #[cfg(test)]
 mod tests;

@@ -9,18 +9,24 @@
 
 mod deviation;
 mod distance;
+mod extremes;
 mod failure;
 mod oracle;
+mod part;
 mod replay;
+mod setup;
 mod time;
 mod walls;
 
-pub use deviation::{Gouge, Leftover, Quantiles};
+pub use deviation::{Gouge, Leftover, Quantiles, out_of_reach};
+pub use extremes::{Extremes, Peak};
 pub use failure::{Failure, FailureKind};
+pub use part::Part;
+pub use setup::{Manners, Setup};
 pub use time::run as run_time;
 
-use crate::gcode::read::ReadError;
-use crate::geom::Heightfield;
+use crate::gcode::read::{self, ReadError};
+use crate::geom::{DVec3, Grid, Heightfield};
 use crate::job::{CutterSpec, Job};
 use crate::motion::{Flow, Times};
 use deviation::Held;
@@ -60,7 +66,7 @@ pub enum ProofError {
         /// The cutter's name.
         cutter: String,
     },
-    /// The two surfaces do not share their nodes, or one holds heights that are no numbers.
+    /// The two surfaces do not share their nodes with the grid, or one holds heights that are no numbers.
     #[error("the target and the reachable surface must be finite heights on one grid")]
     BadTarget,
 }
@@ -70,12 +76,16 @@ pub enum ProofError {
 pub struct ProgramReport {
     /// Its name.
     pub name: String,
+    /// Name of its cutter.
+    pub cutter: String,
     /// Lines of text.
     pub lines: u32,
     /// Straight moves, arcs counted by their chords.
     pub moves: usize,
     /// Where the time goes.
     pub times: Times,
+    /// Time of the feed moves that go down steeper than 45 degrees, s; part of `times.feed_s`.
+    pub plunge_s: f64,
     /// What it asks of the controller, and the speeds that it reaches.
     pub flow: Flow,
     /// All the time, s.
@@ -94,25 +104,42 @@ pub struct ProgramReport {
     pub lowest_mm: f64,
     /// Highest wood above the tip where it cut, mm: what the flutes had to reach.
     pub engaged_mm: f64,
+    /// The hardest moments, and their lines.
+    pub extremes: Extremes,
 }
 
 /// The outcome of a proof.
 #[derive(Debug, Clone)]
 pub struct Verdict {
-    /// All that is wrong; empty when the programs may be written.
+    /// All that is wrong; empty when the programs may be written, or run.
     pub failures: Vec<Failure>,
-    /// What is left above the target.
+    /// What is unlike our own programs, but does no harm ([`Manners::Foreign`] only).
+    pub remarks: Vec<Failure>,
+    /// What is left above the target; all 0 without one.
     pub leftover: Leftover,
     /// The deepest penetration into the target found, also when it is within the tolerance.
     pub gouge: Option<Gouge>,
-    /// What each program does, in order.
+    /// What each part does, in order.
     pub programs: Vec<ProgramReport>,
+    /// Lowest and highest place of the tip along each axis, work coordinates, mm; `None` without a move.
+    pub envelope: Option<(DVec3, DVec3)>,
     /// Time of all programs, without changing cutters, s.
     pub seconds: f64,
     /// The wood as the programs leave it.
     pub carved: Heightfield,
-    /// Distance of the carved surface from the target at each node, mm: positive = leftover, negative = gouge.
+    /// Distance of the carved surface from the target at each node, mm: positive = leftover, negative = gouge. Empty
+    /// without a target.
     pub deviation: Vec<f32>,
+}
+
+/// What the wood should become.
+#[derive(Debug, Clone, Copy)]
+pub struct Wanted<'a> {
+    /// The target.
+    pub target: &'a Heightfield,
+    /// The lowest surface that the finishing cutters can leave (the morphological closing of the target), on the target's
+    /// grid; it parts the leftover into what they could have removed and what only a smaller one could.
+    pub reach: &'a Heightfield,
 }
 
 impl Verdict {
@@ -122,10 +149,7 @@ impl Verdict {
     }
 }
 
-/// Replays programs on a fresh blank, in order, and holds what they leave against the target.
-///
-/// `reach` is the lowest surface that the finishing cutters can leave (the morphological closing of the target), on
-/// the target's grid; it parts the leftover into what they could have removed and what only a smaller one could.
+/// Reads programs, replays them on a fresh blank, in order, and holds what they leave against what is wanted.
 ///
 /// # Errors
 /// [`ProofError`] when a program cannot be read or judged. What is wrong with a readable one is in
@@ -136,30 +160,67 @@ pub fn prove(
     target: &Heightfield,
     reach: &Heightfield,
 ) -> Result<Verdict, ProofError> {
-    let finite = |h: &Heightfield| h.range().is_some_and(|r| r.0.is_finite() && r.1.is_finite());
-    if target.grid() != reach.grid() || !finite(target) || !finite(reach) {
+    let start = DVec3::new(0.0, 0.0, job.safe_z_mm);
+    let read_one = |p: &ProgramText| match read::read(p.text, &job.machine, start) {
+        Ok(program) => Ok(Part::whole(p.name, p.cutter, program)),
+        Err(source) => Err(ProofError::Read { program: p.name.to_owned(), source }),
+    };
+    let parts = programs.iter().map(read_one).collect::<Result<Vec<_>, _>>()?;
+    let wanted = Some(Wanted { target, reach });
+    judge(&parts, &Setup::from(job), *target.grid(), wanted, &mut |_, _| {})
+}
+
+/// Replays parts of programs on a fresh blank over `grid`, in order, and holds what they leave against what is wanted, if
+/// that is known. `watch` sees the wood after each part, and the part's index.
+///
+/// # Errors
+/// [`ProofError::NoOperation`], [`ProofError::BadTarget`].
+pub fn judge(
+    parts: &[Part],
+    setup: &Setup,
+    grid: Grid,
+    wanted: Option<Wanted>,
+    watch: &mut dyn FnMut(usize, &Heightfield),
+) -> Result<Verdict, ProofError> {
+    let usable = |h: &Heightfield| {
+        *h.grid() == grid && h.range().is_some_and(|r| r.0.is_finite() && r.1.is_finite())
+    };
+    if wanted.is_some_and(|w| !usable(w.target) || !usable(w.reach)) {
         return Err(ProofError::BadTarget);
     }
     let mut ledger = Ledger::default();
-    let replay = replay::replay(programs, job, *target.grid(), &mut ledger)?;
-    let tracks: Vec<Track> = programs
-        .iter()
-        .zip(&replay.programs)
-        .map(|(text, read)| Track { cutter: text.cutter, moves: &read.moves })
-        .collect();
-    let held: Held = deviation::hold(&replay.carved, target, reach, job);
-    let gouge = deviation::judge_gouge(&held, &tracks, programs, job, target, &mut ledger);
-    deviation::judge_leftover(&held, job, &mut ledger);
+    let replay = replay::replay(parts, setup, grid, &mut ledger, watch)?;
+    let tracks: Vec<Track> =
+        parts.iter().map(|p| Track { cutter: &p.cutter, moves: &p.program.moves }).collect();
+    let mut gouge = None;
+    let held = match wanted {
+        Some(Wanted { target, reach }) => {
+            let held = deviation::hold(&replay.carved, target, reach, setup);
+            gouge = deviation::judge_gouge(&held, &tracks, parts, setup, target, &mut ledger);
+            deviation::judge_leftover(&held, setup, &mut ledger);
+            held
+        }
+        None => Held::nothing(),
+    };
     deviation::judge_oracles(&held, &replay.carved, &tracks, &mut ledger);
+    let (failures, remarks) = ledger.into_failures(setup.manners);
     Ok(Verdict {
-        failures: ledger.into_failures(),
+        failures,
+        remarks,
         leftover: held.leftover,
         gouge,
+        envelope: envelope(parts),
         seconds: replay.reports.iter().map(|r| r.seconds).sum(),
         programs: replay.reports,
         carved: replay.carved,
         deviation: held.deviation,
     })
+}
+
+/// The box around all places of the tip, those before the first move left out.
+fn envelope(parts: &[Part]) -> Option<(DVec3, DVec3)> {
+    let places = parts.iter().flat_map(|p| p.program.moves.iter().map(|m| m.to));
+    places.map(|p| (p, p)).reduce(|(low, high), (p, _)| (low.min(p), high.max(p)))
 }
 
 #[cfg(test)]

@@ -18,6 +18,11 @@ pub(super) fn check(input: &Input) -> Result<()> {
     compare(nodes, free, job.relief.pitch_mm)
 }
 
+/// The same for a grid of so many nodes.
+pub(super) fn check_nodes(nodes: usize, pitch_mm: f64) -> Result<()> {
+    free_bytes().map_or(Ok(()), |free| compare(nodes, free, pitch_mm))
+}
+
 fn compare(nodes: usize, free_bytes: f64, pitch_mm: f64) -> Result<()> {
     let need = FIXED_BYTES + nodes as f64 * BYTES_PER_NODE;
     if need > free_bytes {

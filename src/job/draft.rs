@@ -7,8 +7,8 @@ use toml::de::{DeTable, DeValue};
 use super::error::{JobError, Source, shown};
 use super::group::{GroupSpec, read_groups};
 use super::keys::{
-    ARTWORK, AT, BACKGROUND, GROUP, KEEP_OUT, LAYER, MACHINE, OPERATION, RELIEF, SAFETY, STOCK,
-    TOLERANCE, TOP, TRACE, TRACE_METHODS, WOOD, rule,
+    ARTWORK, AT, BACKGROUND, GROUP, KEEP_OUT, LAYER, MACHINE, OPERATION, ORIGINS, RELIEF, SAFETY,
+    STOCK, TOLERANCE, TOP, TRACE, TRACE_METHODS, WOOD, rule,
 };
 use super::layer::{LayerDraft, read_color, read_layer};
 use super::library::{Library, read_machine, read_machine_file, read_wood};
@@ -156,13 +156,7 @@ fn read(
             thickness_mm: stock.sure_number("thickness_mm"),
             wood: read_wood_choice(&stock, library)?,
             grain_rad: stock.sure_number("grain_deg").to_radians(),
-            origin: [
-                Origin::LowerLeft,
-                Origin::LowerRight,
-                Origin::UpperLeft,
-                Origin::UpperRight,
-                Origin::Center,
-            ][stock.choice("origin")],
+            origin: read_origin(&stock)?,
         },
         artwork,
         pitch_mm: relief.number("pitch_mm"),
@@ -336,18 +330,47 @@ fn read_place(table: &Table<'_>) -> Result<Place, JobError> {
     match value.get_ref() {
         DeValue::String(word) if word == "center" => Ok(Place::Center),
         DeValue::Array(items) if items.len() == 2 => {
-            let mut point = [0.0; 2];
-            for (slot, item) in point.iter_mut().zip(items) {
-                let Some(number) = as_number(item.get_ref()) else {
-                    return Err(table.wrong_form("at", item.span(), item.get_ref()));
-                };
-                table.check_range("at", item.span(), number, AT)?;
-                *slot = number;
-            }
-            Ok(Place::LowerLeft(DVec2::from(point)))
+            Ok(Place::LowerLeft(read_point(table, "at", items)?))
         }
         other => Err(table.wrong_form("at", value.span(), other)),
     }
+}
+
+fn read_origin(table: &Table<'_>) -> Result<Origin, JobError> {
+    let Some(value) = table.raw("origin") else { return Ok(Origin::LowerLeft) };
+    match value.get_ref() {
+        DeValue::String(word) => match ORIGINS.iter().position(|name| name == word) {
+            Some(k) => Ok([
+                Origin::LowerLeft,
+                Origin::LowerRight,
+                Origin::UpperLeft,
+                Origin::UpperRight,
+                Origin::Center,
+            ][k]),
+            None => Err(table.unknown_word("origin", "place of the zero", word, ORIGINS)),
+        },
+        DeValue::Array(items) if items.len() == 2 => {
+            Ok(Origin::Point(read_point(table, "origin", items)?))
+        }
+        other => Err(table.wrong_form("origin", value.span(), other)),
+    }
+}
+
+/// `[x, y]` of this key, mm.
+fn read_point(
+    table: &Table<'_>,
+    key: &'static str,
+    items: &[toml::Spanned<DeValue<'_>>],
+) -> Result<DVec2, JobError> {
+    let mut point = [0.0; 2];
+    for (slot, item) in point.iter_mut().zip(items) {
+        let Some(number) = as_number(item.get_ref()) else {
+            return Err(table.wrong_form(key, item.span(), item.get_ref()));
+        };
+        table.check_range(key, item.span(), number, AT)?;
+        *slot = number;
+    }
+    Ok(DVec2::from(point))
 }
 
 fn read_background(relief: &Table<'_>) -> Result<BackgroundDraft, JobError> {

@@ -296,9 +296,11 @@ pub(super) static STOCK: Section = Section {
         ),
         key(
             "origin",
-            Kind::Choice(ORIGINS),
+            Kind::Forms(
+                "lower-left, lower-right, upper-left, upper-right, center, or [x, y] in mm",
+            ),
             Text("lower-left"),
-            "where X/Y zero lies on the stock",
+            "X/Y zero on the stock: a corner, \"center\", or [x, y] mm from the lower left corner",
         ),
     ],
 };

@@ -5,7 +5,7 @@ use super::draft::{BackgroundDraft, Draft};
 use super::error::JobError;
 use super::keys::rule;
 use super::operation::{KindDraft, OperationDraft};
-use super::types::{Background, Fit, Found, Job, Place, ReliefSpec, Stock};
+use super::types::{Background, Fit, Found, Job, Origin, Place, ReliefSpec, Stock};
 use crate::geom::{Bounds, DVec2, Grid};
 
 /// Round-off allowed when the artwork just fits into the stock, mm.
@@ -179,10 +179,13 @@ impl Draft {
             Background::Clear | Background::Leave(_) => 0.0,
         };
         let margin = rule::MARGIN_MM + frame;
-        let zero = self.stock.origin.fraction();
-        let needed = match self.artwork.at {
-            Place::Center => artwork + DVec2::splat(2.0 * margin),
-            Place::LowerLeft(point) => {
+        let needed = match (self.artwork.at, self.stock.origin) {
+            (Place::Center, _) => artwork + DVec2::splat(2.0 * margin),
+            (Place::LowerLeft(point), Origin::Point(zero)) => {
+                (zero + point + artwork + DVec2::splat(margin)).max(DVec2::ONE)
+            }
+            (Place::LowerLeft(point), origin) => {
+                let zero = origin.of(DVec2::ONE);
                 // Left of the zero lies the part `zero` of the stock, right of it the rest.
                 let side = |room: f64, part: f64| if part > 0.0 { room / part } else { 0.0 };
                 let axis = |low: f64, high: f64, zero: f64| {

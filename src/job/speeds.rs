@@ -1,7 +1,7 @@
 //! Feed, plunge and spindle speed from wood, cutter and machine.
 
 use super::keys::rule;
-use super::types::{CutterSpec, Machine, Wood};
+use super::types::{CutterSpec, Machine, Operation, OperationKind, Stepover, Within, Wood};
 
 /// What the job says, and what is to be found.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -62,6 +62,24 @@ pub(super) fn find(wanted: Wanted, wood: &Wood, cutter: &CutterSpec, machine: &M
         tidy((rule::PLUNGE * feed_mm_per_min).min(machine.max_rate_mm_per_min.z))
     });
     Speeds { feed_mm_per_min, plunge_mm_per_min, spindle_rpm }
+}
+
+impl Operation {
+    /// Passes all over the stock with the speeds that wood, cutter and machine give: what a program that no job is known
+    /// for is held against.
+    pub fn usual(cutter: &CutterSpec, wood: &Wood, machine: &Machine) -> Self {
+        let wanted = Wanted { feed_mm_per_min: None, plunge_mm_per_min: None, spindle_rpm: None };
+        let speeds = find(wanted, wood, cutter, machine);
+        let stepover = Stepover::Plan(0.4 * cutter.working_mm());
+        Self {
+            kind: OperationKind::Raster { stepover, angle_rad: 0.0 },
+            cutter: cutter.clone(),
+            feed_mm_per_min: speeds.feed_mm_per_min,
+            plunge_mm_per_min: speeds.plunge_mm_per_min,
+            spindle_rpm: speeds.spindle_rpm,
+            within: Within::Stock,
+        }
+    }
 }
 
 /// Spindle speed for a cutter, 1/min: thin ones turn faster, at the same speed of the edge, up to a limit.

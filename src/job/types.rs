@@ -123,13 +123,13 @@ impl Stock {
     /// The blank's rectangle in work coordinates, mm.
     pub fn bounds(&self) -> Bounds {
         let size = DVec2::new(self.width_mm, self.height_mm);
-        let min = -size * self.origin.fraction();
+        let min = -self.origin.of(size);
         Bounds::new(min, min + size)
     }
 }
 
 /// Where X/Y zero lies on the stock.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Origin {
     /// Lower left corner (default).
@@ -142,28 +142,32 @@ pub enum Origin {
     UpperRight,
     /// The middle.
     Center,
+    /// So far right of and above the lower left corner, mm.
+    Point(DVec2),
 }
 
 impl Origin {
-    /// Position of the zero as a fraction of the stock's width and height.
-    pub fn fraction(self) -> DVec2 {
+    /// Where the zero lies on stock of this width and height, from its lower left corner, mm.
+    pub fn of(self, size: DVec2) -> DVec2 {
         match self {
             Self::LowerLeft => DVec2::ZERO,
-            Self::LowerRight => DVec2::X,
-            Self::UpperLeft => DVec2::Y,
-            Self::UpperRight => DVec2::ONE,
-            Self::Center => DVec2::splat(0.5),
+            Self::LowerRight => DVec2::new(size.x, 0.0),
+            Self::UpperLeft => DVec2::new(0.0, size.y),
+            Self::UpperRight => size,
+            Self::Center => 0.5 * size,
+            Self::Point(point) => point,
         }
     }
 
     /// The place in words: `lower left corner`.
-    pub fn words(self) -> &'static str {
+    pub fn words(self) -> String {
         match self {
-            Self::LowerLeft => "lower left corner",
-            Self::LowerRight => "lower right corner",
-            Self::UpperLeft => "upper left corner",
-            Self::UpperRight => "upper right corner",
-            Self::Center => "center",
+            Self::LowerLeft => "lower left corner".to_owned(),
+            Self::LowerRight => "lower right corner".to_owned(),
+            Self::UpperLeft => "upper left corner".to_owned(),
+            Self::UpperRight => "upper right corner".to_owned(),
+            Self::Center => "center".to_owned(),
+            Self::Point(p) => format!("X{} Y{} mm from the lower left corner", p.x, p.y),
         }
     }
 }

@@ -14,7 +14,8 @@ use super::library::Library;
 use super::surface::{Prune, SkeletonSpec, SurfaceSpec};
 use super::types::{
     Backdrop, Background, Connectivity, CutterShape, CutterSpec, Fit, Found, Job, LayerSpec,
-    Machine, Milling, Operation, OperationKind, Pattern, Place, Stepover, TraceSpec, Within, Wood,
+    Machine, Milling, Operation, OperationKind, Origin, Pattern, Place, Stepover, TraceSpec,
+    Within, Wood,
 };
 use crate::geom::{DVec2, DVec3};
 
@@ -242,8 +243,19 @@ fn stock_lines(job: &Job) -> Vec<Line> {
         ("height_mm", number(stock.height_mm)),
         ("thickness_mm", number(stock.thickness_mm)),
         ("grain_deg", degrees(stock.grain_rad)),
-        ("origin", quoted(ORIGINS[stock.origin as usize])),
+        ("origin", origin(stock.origin)),
     ]
+}
+
+fn origin(origin: Origin) -> String {
+    quoted(match origin {
+        Origin::LowerLeft => ORIGINS[0],
+        Origin::LowerRight => ORIGINS[1],
+        Origin::UpperLeft => ORIGINS[2],
+        Origin::UpperRight => ORIGINS[3],
+        Origin::Center => ORIGINS[4],
+        Origin::Point(p) => return format!("[{}, {}]", number(p.x), number(p.y)),
+    })
 }
 
 fn wood_lines(wood: &Wood) -> Vec<Line> {

@@ -28,3 +28,14 @@ pub fn reach(job: &Job, grounds: &Grounds) -> Heightfield {
     }
     least_left(*grounds.target().grid(), &cuts, STRETCH_NODES)
 }
+
+/// The lowest surface that these cutters can leave of a target all over: its closing by each, and at every node the
+/// lowest of them. Without any, the target.
+pub fn reach_of(target: &Heightfield, cutters: &[Profile]) -> Heightfield {
+    let cuts: Vec<(&Heightfield, Profile)> =
+        cutters.iter().map(|profile| (target, profile.clone())).collect();
+    if cuts.is_empty() {
+        return target.clone();
+    }
+    least_left(*target.grid(), &cuts, STRETCH_NODES)
+}

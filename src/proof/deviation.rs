@@ -1,13 +1,13 @@
 //! Holds the carved surface against the target: gouge, leftover, and the second oracle's opinion.
 
-use super::ProgramText;
+use super::Part;
+use super::Setup;
 use super::distance::Terrain;
 use super::failure::{FailureKind, Finding, Ledger};
 use super::oracle::{self, SplitMix64, Track};
 use super::walls::Walls;
 use crate::cutter::Profile;
 use crate::geom::{DVec2, DVec3, Grid, Heightfield};
-use crate::job::Job;
 use crate::stock::Block;
 use rayon::prelude::*;
 
@@ -108,6 +108,18 @@ pub(super) struct Held {
     rows: Vec<RowFound>,
 }
 
+impl Held {
+    /// Without a target.
+    pub(super) fn nothing() -> Self {
+        Self {
+            deviation: Vec::new(),
+            leftover: Leftover::default(),
+            over: Tally::default(),
+            rows: Vec::new(),
+        }
+    }
+}
+
 /// What one row of nodes shows.
 #[derive(Debug, Clone, Default)]
 struct RowFound {
@@ -126,13 +138,13 @@ pub(super) fn hold(
     carved: &Heightfield,
     target: &Heightfield,
     reach: &Heightfield,
-    job: &Job,
+    setup: &Setup,
 ) -> Held {
     let grid = *target.grid();
     let (terrain, reached) = (Terrain::new(target), Terrain::new(reach));
-    let tolerance = job.tolerance;
+    let tolerance = setup.tolerance;
     let limit = tolerance.scallop_mm + tolerance.gouge_mm;
-    let stock = job.stock.bounds().grown(1e-9);
+    let stock = setup.stock.bounds().grown(1e-9);
     let mut deviation = vec![0.0_f32; grid.len()];
     let rows: Vec<RowFound> = deviation
         .par_chunks_mut(grid.nx)
@@ -159,10 +171,12 @@ pub(super) fn hold(
                 let left = f64::from(out.max(0.0));
                 row.left = Spot::worse(row.left, Some(Spot { amount: left, at }));
                 let r = f64::from(reach.at(i, j));
-                let comes_near = r - t <= tolerance.scallop_mm
-                    || terrain.distance(p.extend(r)) <= tolerance.scallop_mm;
-                if comes_near { &mut row.reachable } else { &mut row.unreachable }
-                    .push(left as f32);
+                if comes_near(&terrain, p.extend(t), r, tolerance.scallop_mm) {
+                    &mut row.reachable
+                } else {
+                    &mut row.unreachable
+                }
+                .push(left as f32);
                 if left > limit && c > r {
                     let above = if r > t { reached.distance(at) } else { left };
                     if above > limit {
@@ -175,6 +189,22 @@ pub(super) fn hold(
         .collect();
     let (leftover, over) = leftover(&rows);
     Held { deviation, leftover, over, rows }
+}
+
+/// True where a cutter that leaves the wood at height `reach` comes within a scallop of the target at `at`.
+fn comes_near(terrain: &Terrain, at: DVec3, reach: f64, scallop_mm: f64) -> bool {
+    reach - at.z <= scallop_mm || terrain.distance(at.with_z(reach)) <= scallop_mm
+}
+
+/// Number of nodes at which cutters that leave `reach` do not come within a scallop of the target.
+pub fn out_of_reach(target: &Heightfield, reach: &Heightfield, scallop_mm: f64) -> usize {
+    let grid = target.grid();
+    let terrain = Terrain::new(target);
+    let far = |i: usize, j: usize| {
+        let at = grid.node(i, j).extend(f64::from(target.at(i, j)));
+        !comes_near(&terrain, at, f64::from(reach.at(i, j)), scallop_mm)
+    };
+    (0..grid.ny).into_par_iter().map(|j| (0..grid.nx).filter(|&i| far(i, j)).count()).sum()
 }
 
 fn leftover(rows: &[RowFound]) -> (Leftover, Tally) {
@@ -217,8 +247,8 @@ fn quantiles(values: &mut [f32]) -> Quantiles {
 pub(super) fn judge_gouge(
     held: &Held,
     tracks: &[Track],
-    programs: &[ProgramText],
-    job: &Job,
+    parts: &[Part],
+    setup: &Setup,
     target: &Heightfield,
     ledger: &mut Ledger,
 ) -> Option<Gouge> {
@@ -226,16 +256,17 @@ pub(super) fn judge_gouge(
     let mut deepest = held.rows.iter().fold(None, |a, r| Spot::worse(a, r.gouge));
     let mut too_deep = held.rows.iter().map(|r| r.too_deep).fold(Tally::default(), Tally::join);
     for shift in [DVec2::new(0.5, 0.0), DVec2::new(0.0, 0.5), DVec2::new(0.5, 0.5)] {
-        let (spot, tally) = between(tracks, job, target, &terrain, shift);
+        let (spot, tally) = between(tracks, setup, target, &terrain, shift);
         deepest = Spot::worse(deepest, spot);
         too_deep = too_deep.join(tally);
     }
-    let overcut = judge_walls(tracks, programs, job, target, ledger);
+    let overcut = judge_walls(tracks, parts, setup, target, ledger);
     let Some(spot) = deepest else { return overcut };
     let by = oracle::lowest(tracks, &[spot.at.truncate()])[0].by;
-    let (program, line) = by.map_or(("", 0), |(t, k)| (programs[t].name, tracks[t].moves[k].line));
+    let (program, line) =
+        by.map_or(("", 0), |(t, k)| (parts[t].name.as_str(), tracks[t].moves[k].line));
     if too_deep.count > 0 {
-        let limit = job.tolerance.gouge_mm;
+        let limit = setup.tolerance.gouge_mm;
         let amount = spot.amount;
         let kind = FailureKind::Gouge;
         ledger.note(Finding { kind, program, line, at: spot.at, amount, limit }, too_deep.count);
@@ -247,17 +278,18 @@ pub(super) fn judge_gouge(
 /// Finds the deepest cut into a wall, which may not show at any node; each is a failure.
 fn judge_walls(
     tracks: &[Track],
-    programs: &[ProgramText],
-    job: &Job,
+    parts: &[Part],
+    setup: &Setup,
     target: &Heightfield,
     ledger: &mut Ledger,
 ) -> Option<Gouge> {
     let walls = Walls::new(target);
-    let limit = job.tolerance.gouge_mm;
+    let limit = setup.tolerance.gouge_mm;
     let mut deepest: Option<Gouge> = None;
-    for (track, program) in tracks.iter().zip(programs) {
+    for (track, part) in tracks.iter().zip(parts) {
         let Some(found) = walls.overcut(track, limit) else { continue };
-        let (kind, program, line) = (FailureKind::Gouge, program.name, track.moves[found.by].line);
+        let (kind, program, line) =
+            (FailureKind::Gouge, part.name.as_str(), track.moves[found.by].line);
         let (at, amount) = (found.at, found.depth_mm);
         ledger.note(Finding { kind, program, line, at, amount, limit }, found.count);
         if deepest.as_ref().is_none_or(|d| amount > d.depth_mm) {
@@ -273,7 +305,7 @@ fn judge_walls(
 /// moves are carved again on a shifted grid and held against the surface itself.
 fn between(
     tracks: &[Track],
-    job: &Job,
+    setup: &Setup,
     target: &Heightfield,
     terrain: &Terrain,
     shift: DVec2,
@@ -285,12 +317,12 @@ fn between(
         origin: grid.origin + shift * grid.pitch_mm,
         ..grid
     };
-    let mut block = Block::new(&job.stock, shifted);
+    let mut block = Block::new(&setup.stock, shifted);
     for track in tracks {
         block.cut(&Profile::of(track.cutter), track.moves);
     }
     let carved = block.into_field();
-    let gouge_mm = job.tolerance.gouge_mm;
+    let gouge_mm = setup.tolerance.gouge_mm;
     let (di, dj) = (usize::from(shift.x > 0.0), usize::from(shift.y > 0.0));
     let rows: Vec<(Option<Spot>, Tally)> = (0..shifted.ny)
         .into_par_iter()
@@ -320,9 +352,9 @@ fn between(
 }
 
 /// A strict job answers for every node that its cutters reach.
-pub(super) fn judge_leftover(held: &Held, job: &Job, ledger: &mut Ledger) {
-    if let (true, Some(spot)) = (job.strict, held.over.worst) {
-        let limit = job.tolerance.scallop_mm + job.tolerance.gouge_mm;
+pub(super) fn judge_leftover(held: &Held, setup: &Setup, ledger: &mut Ledger) {
+    if let (true, Some(spot)) = (setup.strict, held.over.worst) {
+        let limit = setup.tolerance.scallop_mm + setup.tolerance.gouge_mm;
         let (kind, amount, at) = (FailureKind::Leftover, spot.amount, spot.at);
         let finding = Finding { kind, program: "", line: 0, at, amount, limit };
         ledger.note(finding, held.over.count);

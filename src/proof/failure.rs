@@ -1,5 +1,6 @@
 //! What can be wrong with a program, each kind once a program with its worst place.
 
+use super::Manners;
 use crate::geom::DVec3;
 
 /// What is wrong.
@@ -21,6 +22,8 @@ pub enum FailureKind {
     Holder,
     /// The program is larger than the machine.
     Travel,
+    /// With the zero where it is, the program leaves the machine's travel.
+    SoftLimit,
     /// A feed that the machine cannot run, or one in wood that no operation of the cutter asks for.
     Feed,
     /// A spindle speed that the spindle does not have, or that no operation of the cutter asks for.
@@ -49,6 +52,21 @@ pub enum FailureKind {
     Leftover,
     /// The replay and the second oracle disagree: a fault of this program, not of the G-code.
     Oracles,
+}
+
+impl FailureKind {
+    /// False for what is only unlike our own programs: it may be meant, and harms nothing by itself.
+    fn does_harm(self) -> bool {
+        !matches!(
+            self,
+            Self::NoDwell
+                | Self::BlindStart
+                | Self::LowRapid
+                | Self::OutsideStock
+                | Self::NoEnd
+                | Self::SpindleSpeed
+        )
+    }
 }
 
 /// Something wrong with a program, at its worst place.
@@ -117,12 +135,12 @@ impl Ledger {
         }
     }
 
-    /// The failures in the order found, with their sentences.
-    pub(super) fn into_failures(mut self) -> Vec<Failure> {
+    /// The failures in the order found, with their sentences, and those that are remarks only by these manners.
+    pub(super) fn into_failures(mut self, manners: Manners) -> (Vec<Failure>, Vec<Failure>) {
         for f in &mut self.0 {
             f.sentence = sentence(f);
         }
-        self.0
+        self.0.into_iter().partition(|f| manners == Manners::Own || f.kind.does_harm())
     }
 }
 
@@ -149,6 +167,9 @@ fn sentence(f: &Failure) -> String {
         FailureKind::Travel => {
             format!("needs {a:.2} mm of travel along one axis, the machine has {l:.2}; carve a smaller piece")
         }
+        FailureKind::SoftLimit => format!(
+            "leaves the machine's travel by {a:.2} mm with the zero where it is; move the stock or set the zero elsewhere"
+        ),
         FailureKind::Feed => {
             format!("a feed of {a:.0} mm/min, the machine and the job's operations with this cutter allow {l:.0}; lower the feed")
         }

@@ -1,11 +1,12 @@
-//! Reads the programs, carves a fresh blank with them and checks every move against machine, cutter and wood.
+//! Carves a fresh blank with the parts of the programs and checks every move against machine, cutter and wood.
 
+use super::extremes::Extremes;
 use super::failure::{FailureKind, Finding, Ledger};
-use super::{ProgramReport, ProgramText, ProofError, time};
+use super::{Manners, Part, ProgramReport, ProofError, Setup, time};
 use crate::cutter::Profile;
-use crate::gcode::read::{self, EventKind, Program};
+use crate::gcode::read::{EventKind, Program};
 use crate::geom::{Bounds, DVec2, DVec3, Grid, Heightfield, Move, MoveKind};
-use crate::job::{CutterSpec, Job, Operation};
+use crate::job::Operation;
 use crate::motion::Planner;
 use crate::stock::{Block, Contact};
 use std::ops::Range;
@@ -38,59 +39,52 @@ const LENGTH_SLACK_MM: f64 = 1e-3;
 
 /// What the replay leaves.
 pub(super) struct Replay {
-    pub(super) programs: Vec<Program>,
     pub(super) reports: Vec<ProgramReport>,
     pub(super) carved: Heightfield,
 }
 
-/// Replays all programs in order.
+/// Replays all parts in order; `watch` sees the wood after each, and the part's place in the order.
 pub(super) fn replay(
-    programs: &[ProgramText],
-    job: &Job,
+    parts: &[Part],
+    setup: &Setup,
     grid: Grid,
     ledger: &mut Ledger,
+    watch: &mut dyn FnMut(usize, &Heightfield),
 ) -> Result<Replay, ProofError> {
-    let start = DVec3::new(0.0, 0.0, job.safe_z_mm);
-    let mut block = Block::new(&job.stock, grid);
-    let (mut read_all, mut reports) = (Vec::new(), Vec::new());
-    for text in programs {
-        let program = read::read(text.text, &job.machine, start)
-            .map_err(|source| ProofError::Read { program: text.name.to_owned(), source })?;
-        let own = operations_of(text, &program, job)?;
+    let mut block = Block::new(&setup.stock, grid);
+    let mut reports = Vec::new();
+    for (k, part) in parts.iter().enumerate() {
+        let own = operations_of(part, setup)?;
         let most = |of: fn(&Operation) -> f64| own.iter().map(|o| of(o)).fold(0.0, f64::max);
         let mut case = Case {
-            text,
-            job,
-            program: &program,
-            plunge_mm_per_min: most(|o| o.plunge_mm_per_min),
-            feed_mm_per_min: most(|o| o.feed_mm_per_min),
+            part,
+            setup,
+            program: &part.program,
+            plunge_mm_per_min: setup.manners.speed_factor() * most(|o| o.plunge_mm_per_min),
+            feed_mm_per_min: setup.manners.speed_factor() * most(|o| o.feed_mm_per_min),
             operations: own,
             ledger,
         };
         reports.push(case.run(&mut block));
-        read_all.push(program);
+        watch(k, block.field());
     }
-    check_travel(programs, &read_all, job, ledger);
-    Ok(Replay { programs: read_all, reports, carved: block.into_field() })
+    check_travel(parts, setup, ledger);
+    Ok(Replay { reports, carved: block.into_field() })
 }
 
-/// The operations that a program can be for: those with its cutter and one of its spindle speeds. Where no speed fits
+/// The operations that a part can be for: those with its cutter and one of its spindle speeds. Where no speed fits
 /// (which is a failure of its own) those with its cutter.
-fn operations_of<'a>(
-    text: &ProgramText,
-    program: &Program,
-    job: &'a Job,
-) -> Result<Vec<&'a Operation>, ProofError> {
+fn operations_of<'a>(part: &Part, setup: &'a Setup) -> Result<Vec<&'a Operation>, ProofError> {
     let of_cutter: Vec<&Operation> =
-        job.operations.iter().filter(|o| o.cutter == *text.cutter).collect();
+        setup.operations.iter().filter(|o| o.cutter == part.cutter).collect();
     if of_cutter.is_empty() {
         return Err(ProofError::NoOperation {
-            program: text.name.to_owned(),
-            cutter: text.cutter.name.clone(),
+            program: part.name.clone(),
+            cutter: part.cutter.name.clone(),
         });
     }
     let spoken = |o: &&Operation| {
-        program.events.iter().any(|e| match e.kind {
+        part.program.events.iter().any(|e| match e.kind {
             EventKind::SpindleOn { rpm, .. } => (rpm - o.spindle_rpm).abs() <= RPM_SLACK,
             _ => false,
         })
@@ -133,10 +127,10 @@ struct Runs {
     plunge: Run,
 }
 
-/// One program being checked.
+/// One part being checked.
 struct Case<'a> {
-    text: &'a ProgramText<'a>,
-    job: &'a Job,
+    part: &'a Part,
+    setup: &'a Setup,
     program: &'a Program,
     plunge_mm_per_min: f64,
     feed_mm_per_min: f64,
@@ -166,11 +160,14 @@ impl Case<'_> {
             air_mm += moves[run.clone()].iter().map(Move::length_mm).sum::<f64>();
             air_s += seconds[run].iter().sum::<f64>();
         }
+        let plunging = moves.iter().zip(seconds).filter(|(m, _)| is_plunge(m));
         ProgramReport {
-            name: self.text.name.to_owned(),
+            name: self.part.name.clone(),
+            cutter: self.part.cutter.name.clone(),
             lines: self.program.lines,
             moves: moves.len(),
             times,
+            plunge_s: plunging.map(|(_, s)| s).sum(),
             flow: planner.flow(),
             seconds: times.total_s(),
             cutting_mm: length(false),
@@ -178,13 +175,14 @@ impl Case<'_> {
             air_s,
             retracts: moves.windows(2).filter(|w| !w[0].is_rapid() && w[1].is_rapid()).count(),
             rapid_mm: length(true),
-            lowest_mm: if moves.is_empty() { self.job.safe_z_mm } else { lowest_mm },
+            lowest_mm: if moves.is_empty() { self.setup.safe_z_mm } else { lowest_mm },
             engaged_mm: contacts.iter().map(|c| f64::from(c.engaged_mm)).fold(0.0, f64::max),
+            extremes: Extremes::of(self.part, &contacts, |m| self.down_mm_per_min(m)),
         }
     }
 
     fn fail(&mut self, kind: FailureKind, line: u32, at: DVec3, amount: f64, limit: f64) {
-        let finding = Finding { kind, program: self.text.name, line, at, amount, limit };
+        let finding = Finding { kind, program: &self.part.name, line, at, amount, limit };
         self.ledger.note(finding, 1);
     }
 
@@ -193,8 +191,10 @@ impl Case<'_> {
         let at = |k: usize| self.program.moves.get(k).map_or(DVec3::ZERO, |m| m.from);
         let end = self.program.moves.last().map_or(DVec3::ZERO, |m| m.to);
         let start = at(0);
-        let safe_z_mm = self.job.safe_z_mm;
-        if let Some(line) = self.program.blind_line {
+        let safe_z_mm = self.setup.safe_z_mm;
+        if !self.part.opens {
+            // It goes on where the part before it ended.
+        } else if let Some(line) = self.program.blind_line {
             self.fail(FailureKind::BlindStart, line, start, 0.0, 0.0);
         } else if let Some((line, z)) = self.program.first_z
             && z < safe_z_mm - LENGTH_SLACK_MM
@@ -203,6 +203,7 @@ impl Case<'_> {
             self.fail(FailureKind::BlindStart, line, at, safe_z_mm - z, 0.0);
         }
         if let Some(m) = self.program.moves.last()
+            && self.part.closes
             && end.z < safe_z_mm - LENGTH_SLACK_MM
         {
             self.fail(FailureKind::EndInWood, m.line, end, safe_z_mm - end.z, safe_z_mm);
@@ -232,20 +233,23 @@ impl Case<'_> {
                 EventKind::Dwell { .. } => {}
             }
         }
-        if running || !ended {
+        if self.part.closes && (running || !ended) {
             self.fail(FailureKind::NoEnd, self.program.lines, end, 0.0, 0.0);
         }
     }
 
     /// The speed that should be there instead; `None` when this one is right.
     fn wanted_rpm(&self, rpm: f64) -> Option<f64> {
-        let machine = &self.job.machine;
+        let machine = &self.setup.machine;
         let (low, high) = (machine.spindle_min_rpm, machine.spindle_max_rpm);
         if rpm > high || rpm < low {
             return Some(if rpm > high { high } else { low });
         }
+        if self.setup.manners == Manners::Foreign {
+            return None;
+        }
         let off = |wanted: f64| (wanted - rpm).abs();
-        let operations = self.job.operations.iter().filter(|o| o.cutter == *self.text.cutter);
+        let operations = self.setup.operations.iter().filter(|o| o.cutter == self.part.cutter);
         operations
             .map(|o| o.spindle_rpm)
             .min_by(|a, b| off(*a).total_cmp(&off(*b)))
@@ -258,7 +262,7 @@ impl Case<'_> {
     /// where the wood is deeper than the flutes are long, all of them.
     fn carve(&mut self, block: &mut Block, lowest_mm: f64) -> Vec<Contact> {
         let moves = &self.program.moves;
-        let cutter = self.text.cutter;
+        let cutter = &self.part.cutter;
         let profile = Profile::of(cutter);
         let depth_mm = -lowest_mm;
         if depth_mm > cutter.stickout_mm
@@ -292,23 +296,23 @@ impl Case<'_> {
     fn travels_low(&self, m: &Move) -> bool {
         m.is_rapid()
             && m.from.truncate() != m.to.truncate()
-            && m.from.z.min(m.to.z) < self.job.safe_z_mm - LENGTH_SLACK_MM
+            && m.from.z.min(m.to.z) < self.setup.safe_z_mm - LENGTH_SLACK_MM
     }
 
     /// Rapids may go sideways below safe Z only where all wood under the cutter has been carved, so that no clamp stands
     /// there, and `clearance_mm` above it.
     fn check_low_rapid(&mut self, block: &Block, m: &Move) {
-        let radius_mm = 0.5 * self.text.cutter.diameter_mm - OUTSIDE_MM;
+        let radius_mm = 0.5 * self.part.cutter.diameter_mm - OUTSIDE_MM;
         let level = Move { from: m.from.with_z(0.0), to: m.to.with_z(0.0), ..*m };
-        let gap_mm = self.job.clearance_mm - LENGTH_SLACK_MM;
-        let stock = self.job.stock.bounds().grown(OUTSIDE_MM);
+        let gap_mm = self.setup.clearance_mm - LENGTH_SLACK_MM;
+        let stock = self.setup.stock.bounds().grown(OUTSIDE_MM);
         let inside = [m.from, m.to].into_iter().all(|p| stock.contains(p.truncate()));
         if !inside
             || block.touch(radius_mm, -CARVED_MM, &level).is_some()
             || block.touch(radius_mm, -gap_mm, m).is_some()
         {
             let (low, safe_z_mm) =
-                (if m.from.z < m.to.z { m.from } else { m.to }, self.job.safe_z_mm);
+                (if m.from.z < m.to.z { m.from } else { m.to }, self.setup.safe_z_mm);
             self.fail(FailureKind::LowRapid, m.line, low, safe_z_mm - low.z, safe_z_mm);
         }
     }
@@ -316,7 +320,7 @@ impl Case<'_> {
     /// Removes the moves in pieces no longer than half the cutter's radius and looks after each whether the
     /// shank or the collet nut stands in wood.
     fn carve_with_shank(&mut self, block: &mut Block, profile: &Profile) -> Vec<Contact> {
-        let cutter: &CutterSpec = self.text.cutter;
+        let cutter = &self.part.cutter;
         let piece_mm = profile.radius_mm() * 0.5;
         let parts = [
             (FailureKind::Shank, cutter.shank_mm * 0.5, cutter.flute_mm),
@@ -377,14 +381,14 @@ impl Case<'_> {
         let (thickness_mm, chip) = (f64::from(c.deepest_mm), f64::from(c.chip));
         let limit =
             |o: &&Operation| o.feed_limit_mm_per_min(thickness_mm, chip).max(o.feed_mm_per_min);
-        self.operations.iter().map(limit).fold(0.0, f64::max)
+        self.setup.manners.speed_factor() * self.operations.iter().map(limit).fold(0.0, f64::max)
     }
 
     /// Downward speed of a feed move, as fast as the machine's Z allows; 0 for others.
     fn down_mm_per_min(&self, m: &Move) -> f64 {
         let MoveKind::Feed { feed_mm_per_min } = m.kind else { return 0.0 };
         let down = feed_mm_per_min * (m.from.z - m.to.z) / m.length_mm();
-        down.min(self.job.machine.max_rate_mm_per_min.z).max(0.0)
+        down.min(self.setup.machine.max_rate_mm_per_min.z).max(0.0)
     }
 
     /// Feed, rapid, plunge, flute, bottom.
@@ -400,7 +404,7 @@ impl Case<'_> {
         match m.kind {
             MoveKind::Rapid => {}
             MoveKind::Feed { feed_mm_per_min } => {
-                let limit = fastest_axis(m, self.job.machine.max_rate_mm_per_min);
+                let limit = fastest_axis(m, self.setup.machine.max_rate_mm_per_min);
                 if !(feed_mm_per_min > 0.0 && feed_mm_per_min <= limit) {
                     self.fail(FailureKind::Feed, m.line, m.to, feed_mm_per_min, limit);
                 } else if raced {
@@ -409,11 +413,11 @@ impl Case<'_> {
                 }
             }
         }
-        let flute_mm = self.text.cutter.flute_mm;
+        let flute_mm = self.part.cutter.flute_mm;
         if f64::from(c.engaged_mm) > flute_mm + LENGTH_SLACK_MM {
             self.fail(FailureKind::Flute, m.line, m.to, f64::from(c.engaged_mm), flute_mm);
         }
-        let below_mm = -self.job.stock.thickness_mm - m.to.z;
+        let below_mm = -self.setup.stock.thickness_mm - m.to.z;
         if below_mm > LENGTH_SLACK_MM {
             self.fail(FailureKind::ThroughBottom, m.line, m.to, below_mm, 0.0);
         }
@@ -421,9 +425,9 @@ impl Case<'_> {
 
     /// No part of the tool comes into a keep-out below its top. Slanted moves count as low as they end.
     fn check_keep_outs(&mut self, m: &Move) {
-        let cutter = self.text.cutter;
+        let cutter = &self.part.cutter;
         let low = m.from.z.min(m.to.z);
-        for zone in &self.job.keep_outs {
+        for zone in &self.setup.keep_outs {
             let parts = [
                 (cutter.diameter_mm, 0.0),
                 (cutter.shank_mm, cutter.flute_mm),
@@ -451,7 +455,7 @@ impl Case<'_> {
         // The distance from a rectangle is convex, so the ends of the part below the top are the farthest.
         let high = m.from + m.to - low;
         let share = if high.z > 0.0 { low.z / (low.z - high.z) } else { 1.0 };
-        let stock = self.job.stock.bounds();
+        let stock = self.setup.stock.bounds();
         for p in [low, low + (high - low) * share] {
             let out = (stock.min - p.truncate()).max(p.truncate() - stock.max).max(DVec2::ZERO);
             if out.length() > OUTSIDE_MM {
@@ -462,7 +466,7 @@ impl Case<'_> {
 
     /// The spindle must turn, and have had its time to start, wherever the tip is in wood.
     fn check_spindle(&mut self, contacts: &[Contact]) {
-        let need_s = self.job.machine.spindle_dwell_s;
+        let need_s = self.setup.machine.spindle_dwell_s;
         let (mut running, mut waited_s) = (false, 0.0);
         let (mut still, mut early) = (Run::default(), Run::default());
         let mut events = self.program.events.iter().peekable();
@@ -487,10 +491,16 @@ impl Case<'_> {
 
     /// Time and flow by the model of the planner.
     fn run_planner(&self) -> Planner {
-        let mut planner = Planner::new(&self.job.machine).recording();
+        let mut planner = Planner::new(&self.setup.machine).recording();
         time::run(self.program, &[], &mut planner);
         planner
     }
+}
+
+/// True for feed moves that go down steeper than 45 degrees.
+fn is_plunge(m: &Move) -> bool {
+    let across = m.from.truncate().distance(m.to.truncate());
+    !m.is_rapid() && m.from.z - m.to.z > across
 }
 
 /// The runs of feed moves, longer than `longer_than_mm` together, that meet no wood.
@@ -530,36 +540,52 @@ fn fastest_axis(m: &Move, max_rate: DVec3) -> f64 {
     on(d.x, max_rate.x).max(on(d.y, max_rate.y)).max(on(d.z, max_rate.z))
 }
 
-/// All programs together must fit the machine: the stock stays where it is between them.
-fn check_travel(texts: &[ProgramText], programs: &[Program], job: &Job, ledger: &mut Ledger) {
-    let stock = job.stock.bounds();
-    let middle = stock.center().extend(-0.5 * job.stock.thickness_mm);
+/// All programs together must fit the machine: the stock stays where it is between them. Where the place of the zero
+/// is known, they must stay inside the travel as well.
+fn check_travel(parts: &[Part], setup: &Setup, ledger: &mut Ledger) {
+    let stock = setup.stock.bounds();
+    let middle = stock.center().extend(-0.5 * setup.stock.thickness_mm);
+    let moves = || parts.iter().flat_map(|p| p.program.moves.iter().map(move |m| (p, m)));
     for axis in 0..3 {
         let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
-        let mut far: Option<(usize, Move)> = None;
-        for (t, m) in
-            programs.iter().enumerate().flat_map(|(t, p)| p.moves.iter().map(move |m| (t, m)))
-        {
+        let mut far: Option<(&Part, &Move)> = None;
+        for (part, m) in moves() {
             let v = m.to[axis];
             (low, high) = (low.min(v), high.max(v));
             let off = |m: &Move| (m.to[axis] - middle[axis]).abs();
-            if far.is_none_or(|(_, f)| off(m) > off(&f)) {
-                far = Some((t, *m));
+            if far.is_none_or(|(_, f)| off(m) > off(f)) {
+                far = Some((part, m));
             }
         }
-        let travel = job.machine.travel_mm[axis];
+        let travel = setup.machine.travel_mm[axis];
         if high - low > travel + LENGTH_SLACK_MM
-            && let Some((t, m)) = far
+            && let Some((part, m)) = far
         {
             let finding = Finding {
                 kind: FailureKind::Travel,
-                program: texts[t].name,
+                program: &part.name,
                 line: m.line,
                 at: m.to,
                 amount: high - low,
                 limit: travel,
             };
             ledger.note(finding, 1);
+        }
+        let Some(zero) = setup.zero_mm else { continue };
+        for (part, m) in moves() {
+            let place = zero[axis] + m.to[axis];
+            let out_mm = place.max(-travel - place);
+            if out_mm > LENGTH_SLACK_MM {
+                let finding = Finding {
+                    kind: FailureKind::SoftLimit,
+                    program: &part.name,
+                    line: m.line,
+                    at: m.to,
+                    amount: out_mm,
+                    limit: 0.0,
+                };
+                ledger.note(finding, 1);
+            }
         }
     }
 }

@@ -525,9 +525,9 @@ fn the_second_oracle_sees_a_wrong_replay() {
     let tracks = [Track { cutter: &job.operations[0].cutter, moves: &moves }];
     let judge = |carved: &Heightfield| {
         let mut ledger = Ledger::default();
-        let held = deviation::hold(carved, &target, &target, &job);
+        let held = deviation::hold(carved, &target, &target, &Setup::from(&job));
         deviation::judge_oracles(&held, carved, &tracks, &mut ledger);
-        ledger.into_failures()
+        ledger.into_failures(Manners::Own).0
     };
     assert_eq!(judge(&target), []);
     for off in [-0.005, 0.005] {
@@ -604,10 +604,11 @@ fn the_time_is_that_of_the_firmware() {
         job.stock.thickness_mm = 100.0;
         let grid = Grid::covering(DVec2::ZERO, 40.0, 20.0, 0.5).unwrap();
         let mut ledger = Ledger::default();
-        let programs = [ProgramText { name: "1", text, cutter: &job.operations[0].cutter }];
         // The firmware started at zero in all axes.
-        job.safe_z_mm = 0.0;
-        let replay = replay::replay(&programs, &job, grid, &mut ledger).unwrap();
+        let program = read::read(text, &job.machine, DVec3::ZERO).unwrap();
+        let parts = [Part::whole("1", &job.operations[0].cutter, program)];
+        let setup = Setup::from(&job);
+        let replay = replay::replay(&parts, &setup, grid, &mut ledger, &mut |_, _| {}).unwrap();
         let seconds = replay.reports[0].seconds;
         println!("{seconds:.3} s, firmware {firmware_s} s");
         assert!((seconds / firmware_s - 1.0).abs() < 0.01, "{seconds} s, firmware {firmware_s} s");

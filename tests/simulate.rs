@@ -1,0 +1,346 @@
+//! `relievo simulate` as a user meets it: what it finds in programs that are in order, and in programs that are not.
+#![allow(clippy::unwrap_used, reason = "a test: what cannot be read or run should stop it")]
+
+use std::path::{Path, PathBuf};
+use std::process::Output;
+use std::sync::OnceLock;
+
+const SHAPE: &str = r##"<svg xmlns="http://www.w3.org/2000/svg" width="24mm" height="16mm" viewBox="0 0 24 16">
+<ellipse cx="12" cy="8" rx="11" ry="7" fill="#2a7f3f"/></svg>"##;
+
+const JOB: &str = r#"
+title = "Hill"
+[artwork]
+file = "hill.svg"
+[stock]
+width_mm = 32
+height_mm = 24
+thickness_mm = 10
+[relief]
+pitch_mm = 0.2
+depth_mm = 4
+[[layer]]
+name = "hill"
+select = "all"
+height_mm = 3.5
+[[operation]]
+kind = "rough"
+cutter = "flat-6"
+[[operation]]
+kind = "raster"
+cutter = "ball-3"
+scallop_mm = 0.03
+"#;
+
+const ROUGH: &str = "1-rough-flat-6.nc";
+const FINISH: &str = "2-finish-ball-3.nc";
+
+fn relievo(folder: &Path, args: &[&str]) -> Output {
+    assert_cmd::Command::cargo_bin("relievo")
+        .unwrap()
+        .current_dir(folder)
+        .args(args)
+        .output()
+        .unwrap()
+}
+
+/// The folder of a carving, made once.
+fn carving() -> &'static Path {
+    static FOLDER: OnceLock<tempfile::TempDir> = OnceLock::new();
+    let desk = FOLDER.get_or_init(|| {
+        let desk = tempfile::tempdir().unwrap();
+        std::fs::write(desk.path().join("hill.svg"), SHAPE).unwrap();
+        std::fs::write(desk.path().join("hill.toml"), JOB).unwrap();
+        let out = relievo(desk.path(), &["carve", "hill.toml", "--out", "out"]);
+        assert_eq!(out.status.code(), Some(0), "{}", String::from_utf8_lossy(&out.stderr));
+        desk
+    });
+    desk.path()
+}
+
+fn program(name: &str) -> Vec<String> {
+    let text = std::fs::read_to_string(carving().join("out").join(name)).unwrap();
+    text.lines().map(str::to_owned).collect()
+}
+
+/// The carving's programs with one of them replaced, simulated with its job; exit code and JSON.
+fn simulate(changed: &str, lines: &[String], more: &[&str]) -> (i32, serde_json::Value, String) {
+    let desk = tempfile::tempdir().unwrap();
+    for name in [ROUGH, FINISH] {
+        let text = if name == changed { lines.join("\n") } else { program(name).join("\n") };
+        std::fs::write(desk.path().join(name), text + "\n").unwrap();
+    }
+    let job = carving().join("hill.toml");
+    let mut args = vec!["simulate", ROUGH, FINISH, "--dry", "--json", "--job"];
+    args.push(job.to_str().unwrap());
+    args.extend(more);
+    let out = relievo(desk.path(), &args);
+    let json = serde_json::from_slice(&out.stdout).unwrap_or(serde_json::Value::Null);
+    (out.status.code().unwrap(), json, String::from_utf8_lossy(&out.stderr).into_owned())
+}
+
+/// The failures of a kind: program and line.
+fn failures(json: &serde_json::Value, kind: &str) -> Vec<(String, u64)> {
+    let all = json["failures"].as_array().unwrap().iter();
+    all.filter(|f| f["kind"] == kind)
+        .map(|f| (f["program"].as_str().unwrap().to_owned(), f["line"].as_u64().unwrap()))
+        .collect()
+}
+
+/// Index of the first line from `from` on for which `is` holds.
+fn find(lines: &[String], from: usize, is: impl Fn(&str) -> bool) -> usize {
+    from + lines[from..].iter().position(|l| is(l)).unwrap()
+}
+
+/// A fault of this kind is found at line `index + 1` of the program.
+fn caught(changed: &str, lines: &[String], kind: &str, index: usize) {
+    let (code, json, err) = simulate(changed, lines, &[]);
+    assert_eq!(code, 4, "{err}");
+    let want = (changed.to_owned(), index as u64 + 1);
+    assert_eq!(failures(&json, kind), [want], "{err}");
+}
+
+#[test]
+fn our_own_programs_pass_and_tell_the_same_as_the_proof() {
+    let (code, json, err) = simulate(ROUGH, &program(ROUGH), &[]);
+    assert_eq!(code, 0, "{err}");
+    assert_eq!(json["failures"].as_array().unwrap().len(), 0);
+    assert_eq!(json["remarks"].as_array().unwrap().len(), 0);
+    let out = relievo(carving(), &["carve", "hill.toml", "--out", "again", "--json"]);
+    let carved: serde_json::Value = serde_json::from_slice(&out.stdout).unwrap();
+    for key in ["leftover", "gouge", "seconds"] {
+        assert_eq!(json[key], carved[key], "{key}");
+    }
+    let times = |r: &serde_json::Value| {
+        let of = |key: &str| r["times"][key].as_f64().unwrap();
+        (of("rapid_s") + of("feed_s") + of("dwell_s"), r["seconds"].as_f64().unwrap())
+    };
+    for report in json["programs"].as_array().unwrap() {
+        let (sum, all) = times(report);
+        assert!((sum - all).abs() < 1e-6 * all);
+        assert!(report["air_s"].as_f64().unwrap() + report["plunge_s"].as_f64().unwrap() < all);
+        // No chip is thicker than twice what the wood's table gives for the cutter: the finest chips are thinned.
+        let chip = report["extremes"]["chip_load_mm"]["value"].as_f64().unwrap();
+        assert!((0.005..0.12).contains(&chip), "{chip}");
+    }
+}
+
+#[test]
+fn the_job_beside_our_programs_is_found_and_pictures_are_written() {
+    let desk = tempfile::tempdir().unwrap();
+    for entry in std::fs::read_dir(carving().join("out")).unwrap() {
+        let path = entry.unwrap().path();
+        std::fs::copy(&path, desk.path().join(path.file_name().unwrap())).unwrap();
+    }
+    let job = std::fs::read_to_string(desk.path().join("job.toml")).unwrap();
+    std::fs::write(desk.path().join("job.toml"), job.replace("../hill.svg", "hill.svg")).unwrap();
+    std::fs::write(desk.path().join("hill.svg"), SHAPE).unwrap();
+    let out = relievo(desk.path(), &["simulate", ROUGH, FINISH]);
+    let said = String::from_utf8_lossy(&out.stdout);
+    assert_eq!(out.status.code(), Some(0), "{}", String::from_utf8_lossy(&out.stderr));
+    assert!(said.contains("job beside the programs") && said.contains("passed"), "{said}");
+    for name in ["carved.png", "deviation.png", "paths.png"] {
+        let file = desk.path().join("1-rough-flat-6-simulated").join(name);
+        assert!(std::fs::read(file).unwrap().starts_with(b"\x89PNG"), "{name}");
+    }
+}
+
+#[test]
+fn a_gouge_of_two_hundredths_is_caught() {
+    // Down by 0.02 mm and up again, in the middle of the pass.
+    let mut lines = program(FINISH);
+    let is_low = |l: &str| l.starts_with('X') && !l.contains('Z') && !l.contains('F');
+    let k = find(&lines, lines.len() / 2, is_low);
+    let z = lines[..=k].iter().rev().find_map(|l| word(l, 'Z')).unwrap();
+    lines.splice(k + 1..k + 1, [format!("Z{:.3}", z - 0.02), format!("Z{z}")]);
+    caught(FINISH, &lines, "gouge", k + 1);
+}
+
+#[test]
+fn a_rapid_through_wood_is_caught() {
+    // The first way across in the cut becomes a rapid.
+    let mut lines = program(ROUGH);
+    let down = find(&lines, 0, |l| word(l, 'Z').is_some_and(|z| z < -0.5));
+    let k = find(&lines, down + 1, |l| l.starts_with('X') || l.starts_with('Y'));
+    let feed = lines[..k].iter().rev().find_map(|l| word(l, 'F')).unwrap();
+    lines[k] = format!("G0{}", lines[k].split('F').next().unwrap());
+    let next = lines[k + 1].clone();
+    lines[k + 1] = if next.starts_with('G') { next } else { format!("G1{next}F{feed}") };
+    let (code, json, err) = simulate(ROUGH, &lines, &[]);
+    assert_eq!(code, 4, "{err}");
+    assert_eq!(failures(&json, "rapid-in-wood"), [(ROUGH.to_owned(), k as u64 + 1)], "{err}");
+}
+
+#[test]
+fn a_missing_retract_is_caught() {
+    // The last retract of roughing goes: the program ends in the wood.
+    let mut lines = program(ROUGH);
+    let k = lines.iter().rposition(|l| word(l, 'Z') == Some(5.0)).unwrap();
+    lines.remove(k);
+    let (code, json, err) = simulate(ROUGH, &lines, &[]);
+    assert_eq!(code, 4, "{err}");
+    let found = failures(&json, "end-in-wood");
+    assert!(found.iter().any(|f| f.0 == ROUGH), "{err}");
+}
+
+#[test]
+fn wrong_units_are_caught() {
+    let lines: Vec<String> = program(ROUGH).iter().map(|l| l.replace("G21", "G20")).collect();
+    let (code, json, err) = simulate(ROUGH, &lines, &[]);
+    assert_eq!(code, 4, "{err}");
+    for kind in ["travel", "through-bottom", "outside-stock"] {
+        assert_eq!(failures(&json, kind).first().map(|f| f.0.as_str()), Some(ROUGH), "{kind}");
+    }
+}
+
+#[test]
+fn a_swapped_cutter_is_caught() {
+    let more = ["--cutter", "ball-3", "--cutter", "flat-6"];
+    let (code, json, err) = simulate(ROUGH, &program(ROUGH), &more);
+    assert_eq!(code, 4, "{err}");
+    assert_eq!(failures(&json, "gouge")[0].0, FINISH, "{err}");
+}
+
+#[test]
+fn a_wrong_arc_centre_is_caught() {
+    // A small circle on the ground beside the hill, before the program ends.
+    let mut lines = program(FINISH);
+    let end = lines.iter().position(|l| l == "M5").unwrap();
+    let circle = ["G0Z5", "X2Y12", "G1Z-4F200", "G2X2Y12I0.5F600", "G0Z5"].map(str::to_owned);
+    lines.splice(end..end, circle);
+    let (code, _, err) = simulate(FINISH, &lines, &[]);
+    assert_eq!(code, 0, "{err}");
+    lines[end + 3] = "G2X2Y12I2F600".to_owned();
+    caught(FINISH, &lines, "gouge", end + 3);
+    // A centre that no circle through both ends has cannot be read at all.
+    lines[end + 3] = "G2X3Y12I0.7F600".to_owned();
+    let (code, _, err) = simulate(FINISH, &lines, &[]);
+    assert_eq!(code, 1, "{err}");
+    assert!(
+        err.contains(&format!("{FINISH}, line {}", end + 4)) && err.contains("circle"),
+        "{err}"
+    );
+}
+
+#[test]
+fn a_spindle_that_is_off_is_caught() {
+    let mut lines = program(ROUGH);
+    let k = find(&lines, 0, |l| l.starts_with("M3"));
+    lines.remove(k);
+    let (code, json, err) = simulate(ROUGH, &lines, &[]);
+    assert_eq!(code, 4, "{err}");
+    let first_cut = find(&lines, 0, |l| word(l, 'Z').is_some_and(|z| z < 0.0)) as u64 + 1;
+    let found = failures(&json, "spindle-off");
+    assert!(found[0].0 == ROUGH && found[0].1 >= first_cut, "{err}");
+}
+
+#[test]
+fn ten_times_the_feed_is_caught() {
+    // The first feed in wood becomes ten times itself.
+    let mut lines = program(ROUGH);
+    let in_wood = |l: &str| word(l, 'Z').is_some_and(|z| z < 0.0) && word(l, 'F').is_some();
+    let k = find(&lines, 0, in_wood);
+    let feed = word(&lines[k], 'F').unwrap();
+    lines[k] = lines[k].replace(&format!("F{feed}"), &format!("F{}", 10.0 * feed));
+    caught(ROUGH, &lines, "feed", k);
+}
+
+#[test]
+fn incremental_distances_left_on_are_caught() {
+    let mut lines = program(ROUGH);
+    let k = find(&lines, 0, |l| word(l, 'Z').is_some_and(|z| z < 0.0));
+    lines.insert(k + 1, "G91".to_owned());
+    let (code, json, err) = simulate(ROUGH, &lines, &[]);
+    if code == 1 {
+        // The next arc is none any more.
+        assert!(err.contains("circle"), "{err}");
+        return;
+    }
+    assert_eq!(code, 4, "{err}");
+    assert!(!failures(&json, "outside-stock").is_empty(), "{err}");
+}
+
+#[test]
+fn programs_without_a_job_are_judged_by_what_they_say() {
+    let desk = tempfile::tempdir().unwrap();
+    for name in [ROUGH, FINISH] {
+        std::fs::write(desk.path().join(name), program(name).join("\n") + "\n").unwrap();
+    }
+    let out = relievo(desk.path(), &["simulate", ROUGH, FINISH, "--json", "--dry"]);
+    assert_eq!(out.status.code(), Some(0), "{}", String::from_utf8_lossy(&out.stderr));
+    let json: serde_json::Value = serde_json::from_slice(&out.stdout).unwrap();
+    assert_eq!(json["stock"]["size_mm"], serde_json::json!([32.0, 24.0, 10.0]));
+    assert_eq!(json["machine"], "shapeoko3");
+    assert_eq!(json["programs"][1]["cutter"], "ball-3");
+    assert!(json["leftover"].is_null());
+}
+
+const SLOT: &str =
+    "G21 G90\nG0 Z5\nM3 S18000\nG0 X10 Y10\nG1 Z-2 F300\nG1 X40 F1200\nG0 Z5\nM5\nM30\n";
+
+#[test]
+fn a_program_from_elsewhere_gets_stock_around_what_it_cuts() {
+    let desk = tempfile::tempdir().unwrap();
+    std::fs::write(desk.path().join("slot.nc"), SLOT).unwrap();
+    let args = ["simulate", "slot.nc", "--cutter", "flat-6", "--json", "--dry"];
+    let out = relievo(desk.path(), &args);
+    assert_eq!(out.status.code(), Some(0), "{}", String::from_utf8_lossy(&out.stderr));
+    let json: serde_json::Value = serde_json::from_slice(&out.stdout).unwrap();
+    // 3 mm of cutter and 5 mm of margin around 10..40 and 10; 2 mm of depth and 5 mm of floor.
+    assert_eq!(json["stock"]["size_mm"], serde_json::json!([46.0, 16.0, 7.0]));
+    assert_eq!(json["stock"]["lower_left_mm"], serde_json::json!([2.0, 2.0]));
+    let extremes = &json["programs"][0]["extremes"];
+    assert_eq!(extremes["thickest_mm"]["line"], 5);
+    assert_eq!(extremes["thickest_mm"]["value"], 2.0);
+    // A slot with two flutes: 1200 mm/min over 2 x 18000 teeth a minute.
+    assert!((extremes["chip_load_mm"]["value"].as_f64().unwrap() - 1200.0 / 36000.0).abs() < 1e-6);
+    assert_eq!(extremes["chip_load_mm"]["line"], 6);
+    assert_eq!(json["programs"][0]["retracts"], 1);
+}
+
+#[test]
+fn the_zero_is_held_against_the_travel() {
+    let desk = tempfile::tempdir().unwrap();
+    std::fs::write(desk.path().join("slot.nc"), SLOT).unwrap();
+    let at = |zero: &str| {
+        let args = ["simulate", "slot.nc", "--cutter", "flat-6", "--json", "--dry", "--zero", zero];
+        let out = relievo(desk.path(), &args);
+        (out.status.code(), String::from_utf8_lossy(&out.stderr).into_owned())
+    };
+    // The Shapeoko 3 has 425 x 465 x 80 mm; the slot goes to X40 and up to Z5.
+    assert_eq!(at("-400,-400,-40").0, Some(0));
+    let (code, err) = at("-38.5,-400,-40");
+    assert!(code == Some(4) && err.contains("1.50 mm") && err.contains("line 6"), "{err}");
+    let (code, err) = at("-400,-400,-4");
+    assert!(code == Some(4) && err.contains("1.00 mm"), "{err}");
+}
+
+#[test]
+fn what_is_not_known_is_asked_for() {
+    let desk = tempfile::tempdir().unwrap();
+    std::fs::write(desk.path().join("slot.nc"), SLOT).unwrap();
+    for (args, words) in [
+        (&["simulate", "slot.nc"][..], "--cutter"),
+        (&["simulate", "slot.nc", "--cutter", "flat-99"], "no cutter 'flat-99'"),
+        (&["simulate", "slot.nc", "--cutter", "flat-6", "--wood", "moon"], "no wood 'moon'"),
+        (&["simulate", "none.nc", "--cutter", "flat-6"], "none.nc"),
+        (&["simulate", "slot.nc", "--cutter", "flat-6", "--origin", "center"], "--stock"),
+    ] {
+        let out = relievo(desk.path(), args);
+        let err = String::from_utf8_lossy(&out.stderr);
+        assert!(out.status.code() == Some(1) && err.contains(words), "{args:?}: {err}");
+    }
+    let files: Vec<PathBuf> =
+        std::fs::read_dir(desk.path()).unwrap().map(|e| e.unwrap().path()).collect();
+    assert_eq!(files, [desk.path().join("slot.nc")], "a refused run writes nothing");
+}
+
+/// The number behind a letter, outside comments.
+fn word(line: &str, letter: char) -> Option<f64> {
+    if line.starts_with('(') {
+        return None;
+    }
+    let rest = line.split(letter).nth(1)?;
+    let end = rest.find(|c: char| !(c == '-' || c == '.' || c.is_ascii_digit()));
+    rest[..end.unwrap_or(rest.len())].parse().ok()
+}
