@@ -229,7 +229,10 @@ impl Case<'_> {
                         self.fail(FailureKind::EndInWood, e.line, m.to, -m.to.z, 0.0);
                     }
                 }
-                EventKind::Dwell { .. } => {}
+                EventKind::Dwell { .. }
+                | EventKind::Tool { .. }
+                | EventKind::Stop { .. }
+                | EventKind::Coolant { .. } => {}
             }
         }
         if running || !ended {
@@ -473,6 +476,8 @@ impl Case<'_> {
                     EventKind::SpindleOn { .. } => (running, waited_s) = (true, 0.0),
                     EventKind::SpindleOff | EventKind::End => running = false,
                     EventKind::Dwell { seconds } => waited_s += seconds,
+                    EventKind::Tool { .. } | EventKind::Stop { .. } | EventKind::Coolant { .. } => {
+                    }
                 }
             }
             if let Some(removed_mm) = still.add(!running, m, *c) {
