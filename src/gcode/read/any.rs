@@ -235,6 +235,20 @@ impl Foreign<'_> {
             self.note(Topic::Skip, text);
         }
         self.core.refuse_after_end()?;
+        // On most lines no other word acts; but G93 counts for each line anew.
+        if !self.core.line.has_axes_alone() || self.feed_mode == FeedMode::Inverse {
+            self.obey_words_before_motion()?;
+        }
+        self.obey_motion()?;
+        self.core.refuse_unused()?;
+        if let Some(optional) = self.more.optional_stop {
+            self.core.event(EventKind::Stop { optional });
+        }
+        self.core.obey_end();
+        Ok(())
+    }
+
+    fn obey_words_before_motion(&mut self) -> Result<(), ReadError> {
         if self.core.line.inches.is_some() {
             self.noted |= 1 << Topic::Units as u32;
         }
@@ -247,14 +261,7 @@ impl Foreign<'_> {
         }
         self.obey_dwell()?;
         self.core.obey_modes();
-        self.obey_modes()?;
-        self.obey_motion()?;
-        self.core.refuse_unused()?;
-        if let Some(optional) = self.more.optional_stop {
-            self.core.event(EventKind::Stop { optional });
-        }
-        self.core.obey_end();
-        Ok(())
+        self.obey_modes()
     }
 
     /// F: in G93 the motions of a minute, for this line alone.

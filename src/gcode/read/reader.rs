@@ -123,6 +123,17 @@ impl Reader<'_> {
     /// Does what the line says, in the firmware's order.
     pub(super) fn obey(&mut self) -> Result<(), ReadError> {
         self.refuse_after_end()?;
+        // On most lines no other word acts.
+        if !self.line.has_axes_alone() {
+            self.obey_words_before_motion()?;
+        }
+        self.obey_motion()?;
+        self.refuse_unused()?;
+        self.obey_end();
+        Ok(())
+    }
+
+    fn obey_words_before_motion(&mut self) -> Result<(), ReadError> {
         self.obey_units();
         if let Some(f) = self.take_feed()? {
             self.feed = Feed::PerMinute(f * self.mm_per_unit);
@@ -131,16 +142,15 @@ impl Reader<'_> {
         self.take_tool(MAX_TOOL)?;
         self.obey_dwell()?;
         self.obey_modes();
-        self.obey_motion()?;
-        self.refuse_unused()?;
-        self.obey_end();
         Ok(())
     }
 
+    #[inline]
     pub(super) fn refuse_after_end(&self) -> Result<(), ReadError> {
         if self.ended { Err(self.error_first(Fault::AfterEnd)) } else { Ok(()) }
     }
 
+    #[inline]
     pub(super) fn obey_units(&mut self) {
         if let Some(inches) = self.line.inches {
             self.mm_per_unit = if inches { 25.4 } else { 1.0 };
@@ -148,6 +158,7 @@ impl Reader<'_> {
     }
 
     /// The number after F.
+    #[inline]
     pub(super) fn take_feed(&mut self) -> Result<Option<f64>, ReadError> {
         match self.line.take(b'F') {
             Some(f) if f <= 0.0 => {
@@ -159,6 +170,7 @@ impl Reader<'_> {
     }
 
     /// The number after T.
+    #[inline]
     pub(super) fn take_tool(&mut self, most: f64) -> Result<Option<u32>, ReadError> {
         match self.line.take(b'T') {
             Some(t) if !(0.0..=most).contains(&t) || t.fract() != 0.0 => {
@@ -168,6 +180,7 @@ impl Reader<'_> {
         }
     }
 
+    #[inline]
     pub(super) fn obey_dwell(&mut self) -> Result<(), ReadError> {
         if self.line.dwell {
             let Some(seconds) = self.line.take(b'P').filter(|s| *s >= 0.0) else {
@@ -180,6 +193,7 @@ impl Reader<'_> {
         Ok(())
     }
 
+    #[inline]
     pub(super) fn obey_modes(&mut self) {
         if let Some(plane) = self.line.plane {
             self.plane = plane;
@@ -189,6 +203,7 @@ impl Reader<'_> {
         }
     }
 
+    #[inline]
     pub(super) fn refuse_unused(&self) -> Result<(), ReadError> {
         match self.line.unused() {
             Some(letter) => Err(self.error_at(letter, Fault::Unused)),
@@ -196,6 +211,7 @@ impl Reader<'_> {
         }
     }
 
+    #[inline]
     pub(super) fn obey_end(&mut self) {
         if self.line.end {
             self.event(EventKind::End);
@@ -216,6 +232,7 @@ impl Reader<'_> {
         }
     }
 
+    #[inline]
     pub(super) fn obey_spindle(&mut self) -> Result<(), ReadError> {
         let speed = self.line.take(b'S');
         if let Some(s) = speed {
@@ -240,6 +257,7 @@ impl Reader<'_> {
         Ok(())
     }
 
+    #[inline]
     pub(super) fn obey_motion(&mut self) -> Result<(), ReadError> {
         if let Some(motion) = self.line.motion {
             self.motion = motion;
@@ -257,10 +275,12 @@ impl Reader<'_> {
         self.travel(self.target(axes), axes)
     }
 
+    #[inline]
     pub(super) fn take_axes(&mut self) -> [Option<f64>; 3] {
         [b'X', b'Y', b'Z'].map(|letter| self.line.take(letter))
     }
 
+    #[inline]
     pub(super) fn refuse_dwell_with_motion(&self) -> Result<(), ReadError> {
         if self.line.dwell {
             let why = "a dwell and a motion on one line are easily misread; split the line";
@@ -270,6 +290,7 @@ impl Reader<'_> {
     }
 
     /// Where the axis words lead.
+    #[inline]
     pub(super) fn target(&self, axes: [Option<f64>; 3]) -> DVec3 {
         let (old, origin) = (self.at.to_array(), self.origin.to_array());
         let mut to = old;
@@ -284,6 +305,7 @@ impl Reader<'_> {
     }
 
     /// Moves the tip by the motion of the line or the one in force.
+    #[inline]
     pub(super) fn travel(&mut self, to: DVec3, axes: [Option<f64>; 3]) -> Result<(), ReadError> {
         self.note_blind(to, axes);
         let path = match self.motion {
@@ -304,15 +326,15 @@ impl Reader<'_> {
         Ok(())
     }
 
+    #[inline]
     fn kind(&self, path: Path, to: DVec3) -> Result<MoveKind, ReadError> {
-        let feed_mm_per_min = match (self.motion, self.feed) {
-            (Motion::Rapid, _) => return Ok(MoveKind::Rapid),
-            (_, Feed::PerMinute(feed_mm_per_min)) => feed_mm_per_min,
-            (_, Feed::Inverse(per_min)) => per_min * self.length_mm(path, to),
-            (_, Feed::Unset) => {
-                return Err(self.error_first(lacks(
-                    "no feed is set for this motion; write F on this line or before",
-                )));
+        let feed_mm_per_min = match self.feed {
+            _ if self.motion == Motion::Rapid => return Ok(MoveKind::Rapid),
+            Feed::PerMinute(feed_mm_per_min) => feed_mm_per_min,
+            Feed::Inverse(per_min) => per_min * self.length_mm(path, to),
+            Feed::Unset => {
+                let why = "no feed is set for this motion; write F on this line or before";
+                return Err(self.error_first(lacks(why)));
             }
         };
         Ok(MoveKind::Feed { feed_mm_per_min })
@@ -326,6 +348,7 @@ impl Reader<'_> {
     }
 
     /// Remembers the first height, and the first motion in X or Y while it is unknown.
+    #[inline]
     pub(super) fn note_blind(&mut self, to: DVec3, [x, y, z]: [Option<f64>; 3]) {
         if z.is_some() {
             self.program.first_z.get_or_insert((self.number, to.z));
@@ -336,6 +359,7 @@ impl Reader<'_> {
         self.z_known |= z.is_some() && self.distance == Distance::Absolute;
     }
 
+    #[inline]
     pub(super) fn push(&mut self, to: DVec3, kind: MoveKind) -> Result<(), ReadError> {
         if to == self.at {
             return Ok(());

@@ -63,6 +63,12 @@ impl Line {
         self.seen == 0
     }
 
+    /// True when X, Y and Z are the only letters of the line.
+    #[inline]
+    pub(super) fn has_axes_alone(&self) -> bool {
+        self.seen & !(bit(b'X') | bit(b'Y') | bit(b'Z')) == 0
+    }
+
     /// Column of the first word.
     pub(super) fn first_column(&self) -> u32 {
         self.first_column
@@ -159,6 +165,7 @@ impl Line {
         Ok(())
     }
 
+    #[inline]
     fn add_g(&mut self, value: f64) -> Result<(), fn(String) -> Fault> {
         match code(value) {
             Some(0) => once(&mut self.motion, Motion::Rapid),
@@ -191,7 +198,7 @@ impl Line {
 }
 
 /// The bit of a letter, A the lowest.
-fn bit(letter: u8) -> u32 {
+const fn bit(letter: u8) -> u32 {
     1 << (letter - b'A')
 }
 
@@ -297,23 +304,32 @@ pub(super) fn number(text: &[u8], from: usize) -> Option<(f64, usize)> {
         }
         _ => false,
     };
-    let (mut mantissa, mut digits, mut point) = (0_u64, 0, None);
-    loop {
-        match text.get(at) {
-            Some(&c @ b'0'..=b'9') => {
-                mantissa = mantissa.wrapping_mul(10).wrapping_add(u64::from(c - b'0'));
-                digits += 1;
-            }
-            Some(b'.') if point.is_none() => point = Some(digits),
-            _ => break,
-        }
-        at += 1;
+    let mut mantissa = 0;
+    let begin = at;
+    at = digits(text, at, &mut mantissa);
+    let (mut count, mut decimals) = (at - begin, 0);
+    if text.get(at) == Some(&b'.') {
+        let point = at;
+        at = digits(text, at + 1, &mut mantissa);
+        decimals = at - point - 1;
+        count += decimals;
     }
-    if digits == 0 || digits > MAX_DIGITS {
+    if count == 0 || count > MAX_DIGITS {
         return None;
     }
-    let value = mantissa as f64 / POW10[digits - point.unwrap_or(digits)];
+    // So few digits are no negative number, and signed ones convert faster.
+    let value = mantissa as i64 as f64 / POW10[decimals];
     Some((if negative { -value } else { value }, at))
+}
+
+/// Appends the digits at a place to a number, and gives where they end.
+#[inline]
+fn digits(text: &[u8], mut at: usize, number: &mut u64) -> usize {
+    while let Some(digit) = text.get(at).map(|c| c.wrapping_sub(b'0')).filter(|d| *d < 10) {
+        *number = number.wrapping_mul(10).wrapping_add(u64::from(digit));
+        at += 1;
+    }
+    at
 }
 
 /// The word at a place, for messages.

@@ -96,8 +96,9 @@ impl Foreign<'_> {
         is_arc: bool,
         from: Distance,
     ) -> Result<(), ReadError> {
-        let said = axes.map(|word| word.is_some());
         let steps = from == Distance::Incremental;
+        // A step of nothing goes nowhere and tells nothing.
+        let said = axes.map(|word| word.is_some_and(|v| !steps || v != 0.0));
         if self.lost.contains(&true) {
             let step_from_lost = steps && (0..3).any(|k| said[k] && self.lost[k]);
             let is_low = self.core.at.z.min(to.z) < self.clear_z_mm;

@@ -194,6 +194,7 @@ fn words_that_are_not_followed_are_refused_by_name_and_place() {
         ("G1 X[1+2] F9\n", 1, 4, "is a parameter or an expression"),
         ("G0 X1\nO100 SUB\n", 2, 1, "'O100' names"),
         ("O100 CALL\n", 1, 1, "'O100' names"),
+        ("O100\nG0 X1\nO200\n", 3, 1, "'O200' is a second program"),
         ("O<A> CALL\n", 1, 1, "subprogram"),
         ("N1 M98 P2\n", 1, 4, "'M98' calls other program text"),
         ("G65 P1\n", 1, 1, "'G65' calls other program text"),
@@ -484,6 +485,7 @@ fn doubts_are_noted_once() {
     assert_eq!(notes, ["line 1", "line 2", "line 4", "line 6", "line 7"], "{:?}", p.notes);
     let p = ok("G21 G91 G0 Z5\nX1\n");
     assert!(p.notes[0].contains("taken as X0 Y0 Z5"), "{:?}", p.notes);
+    assert!(!ok("G21 G91 G28 Z0\n").notes.iter().any(|n| n.contains("steps from")));
     let p = ok("%\nG21 G0 X1\n%\nmore\n");
     assert!(p.notes[0].starts_with("line 3: this '%'"), "{:?}", p.notes);
     assert!(ok("%\nG21 G0 X1\n%\n\n").notes.is_empty());

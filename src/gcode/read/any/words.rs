@@ -120,8 +120,8 @@ pub(super) struct More {
     pub(super) may_be_skipped: bool,
     /// `%` or O with a number, alone on the line.
     pub(super) mark: Option<Mark>,
-    /// G and M words of the line, in tenths; bit by bit.
-    said: [u128; 16],
+    /// Whole G and M words of the line, a bit each.
+    said: [u128; 2],
 }
 
 /// Reads the first line of `text` into `line` and `more` and gives its length and that of its end together.
@@ -235,11 +235,10 @@ fn word(
     let faulty = |fault: fn(String) -> Fault| (column, fault(word_at(text, at)));
     match letter {
         b'G' | b'M' => {
-            let tenths = (value * 10.0).round();
-            if (value * 10.0 - tenths).abs() > 1e-6 || !(0.0..1000.0).contains(&tenths) {
+            let tenths = (value * 10.0 + 0.5) as u32;
+            if (value * 10.0 - f64::from(tenths)).abs() > 1e-6 || tenths >= 1000 {
                 return refused(if letter == b'M' { MACRO } else { UNKNOWN });
             }
-            let tenths = tenths as u32;
             line.mark(letter, column);
             if more.is_new(letter, tenths) {
                 let known =
@@ -316,10 +315,12 @@ type Known = Result<bool, Option<&'static str>>;
 impl More {
     /// False when the line says this word already.
     fn is_new(&mut self, letter: u8, tenths: u32) -> bool {
-        let half = if letter == b'G' { 0 } else { 8 };
-        let (k, bit) = (half + (tenths / 128) as usize, 1_u128 << (tenths % 128));
-        let new = self.said[k] & bit == 0;
-        self.said[k] |= bit;
+        if !tenths.is_multiple_of(10) {
+            return true;
+        }
+        let (said, bit) = (&mut self.said[usize::from(letter == b'M')], 1_u128 << (tenths / 10));
+        let new = *said & bit == 0;
+        *said |= bit;
         new
     }
 
