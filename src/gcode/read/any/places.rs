@@ -108,18 +108,22 @@ impl Foreign<'_> {
             }
         }
         if steps && (0..3).any(|k| said[k] && !self.told[k]) {
-            let at = self.core.at;
-            let text = format!(
-                "G91 steps from where the tip stands, which no line has told; taken as X{} Y{} Z{} of the job",
-                at.x, at.y, at.z
-            );
-            self.note(Topic::Relative, &text);
+            self.doubt_place();
         }
         for (k, said) in said.into_iter().enumerate() {
             self.told[k] |= said && !steps;
             self.lost[k] &= !said;
         }
         Ok(())
+    }
+
+    fn doubt_place(&mut self) {
+        let at = self.core.at;
+        let text = format!(
+            "this line counts on where the tip stands, which no line has told; taken as X{} Y{} Z{} of the job",
+            at.x, at.y, at.z
+        );
+        self.note(Topic::Relative, &text);
     }
 
     pub(super) fn rapid(&mut self, to: DVec3) -> Result<(), ReadError> {
@@ -133,6 +137,9 @@ impl Foreign<'_> {
             Once::Home(which) => self.go_home(which),
             Once::Store(which) => {
                 self.refuse_lost([true; 3])?;
+                if self.told.contains(&false) {
+                    self.doubt_place();
+                }
                 self.offsets.stored_mm[which] = Some(self.core.at);
                 Ok(())
             }

@@ -485,7 +485,9 @@ fn doubts_are_noted_once() {
     assert_eq!(notes, ["line 1", "line 2", "line 4", "line 6", "line 7"], "{:?}", p.notes);
     let p = ok("G21 G91 G0 Z5\nX1\n");
     assert!(p.notes[0].contains("taken as X0 Y0 Z5"), "{:?}", p.notes);
-    assert!(!ok("G21 G91 G28 Z0\n").notes.iter().any(|n| n.contains("steps from")));
+    assert!(!ok("G21 G91 G28 Z0\n").notes.iter().any(|n| n.contains("counts on")));
+    assert!(ok("G28.1\n").notes[0].contains("taken as X0 Y0 Z5"));
+    assert!(ok("G21 G0 X1 Y1 Z1\nG28.1\nG28\n").notes.is_empty());
     let p = ok("%\nG21 G0 X1\n%\nmore\n");
     assert!(p.notes[0].starts_with("line 3: this '%'"), "{:?}", p.notes);
     assert!(ok("%\nG21 G0 X1\n%\n\n").notes.is_empty());

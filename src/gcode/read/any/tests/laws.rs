@@ -199,6 +199,8 @@ proptest! {
     ) {
         let text = Style { inches, steps, lower, by_radius, ..PLAIN }.write(&pieces);
         let text = format!("(head)\nM3 S9000\nG4 P2\n{text}; foot\nT1 M5\nM30\n");
+        // Rounding may spoil half circles by R for the strict reader.
+        prop_assert!(by_radius || read(&text, &machine(), START).is_ok(), "{}", text);
         assert_same(&text)?;
     }
 
@@ -213,8 +215,13 @@ proptest! {
         bytes in prop::collection::vec(any::<u8>(), 0..60),
     ) {
         for frame in [frame(), homed()] {
-            let _ = read_in(&frame, &text);
             let _ = read_any(&bytes, &machine(), &frame);
+            // A way is one way, and what does not rapid has a speed.
+            if let Ok(p) = read_in(&frame, &text) {
+                prop_assert!(p.moves.windows(2).all(|w| w[0].to == w[1].from));
+                prop_assert!(p.moves.iter().all(|m| m.to.is_finite() && (m.is_rapid() || feed_of(m) > 0.0)));
+                prop_assert!(p.events.iter().all(|e| e.at_move <= p.moves.len()));
+            }
         }
     }
 }
