@@ -210,7 +210,7 @@ impl Foreign<'_> {
         }
     }
 
-    /// Does what the line says, in the order of the standard (its table 8), which is the firmware's.
+    /// Does what the line says, in the order of the standard (3.8), which is the firmware's.
     fn obey(&mut self) -> Result<(), ReadError> {
         if self.more.mark == Some(Mark::Tape) {
             if self.progress == Progress::Begun {

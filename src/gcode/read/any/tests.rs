@@ -264,7 +264,7 @@ fn bad_lines_are_refused() {
 fn a_line_may_be_written_in_many_ways() {
     let want = ends(&ok("G0 X0.1234 Y7\n"));
     for text in [
-        // The standard's own example, 3.3.1.
+        // The standard's own example, 3.3.
         "g0x +0. 12 34y 7\n",
         "G00X.1234Y7.\r\n",
         "\u{feff}N100 G0 Y+07 X00.1234\n",
