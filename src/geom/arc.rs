@@ -45,6 +45,16 @@ pub enum Turn {
 /// Chords that the firmware turns on by the series of the rotation before it takes sine and cosine again.
 const CHORDS_BY_SERIES: usize = 12;
 
+/// The angle from one radius to another, radians: negative when clockwise. Radii of one direction make a full circle.
+pub fn sweep(turn: Turn, from: DVec2, to: DVec2) -> f64 {
+    let angle = libm::atan2(from.perp_dot(to), from.dot(to));
+    match turn {
+        Turn::Clockwise if angle >= -5e-7 => angle - std::f64::consts::TAU,
+        Turn::CounterClockwise if angle <= 5e-7 => angle + std::f64::consts::TAU,
+        _ => angle,
+    }
+}
+
 /// End points of the chords of an arc from `from` to `to` round `center`, the last one being `to`.
 ///
 /// The number of chords is GRBL's, from the arc tolerance `$12`: chord length
@@ -62,12 +72,7 @@ pub fn chords(
     let (b, wb) = plane.split(to);
     let (ra, rb) = (a - center, b - center);
     let radius = ra.length();
-    let mut angle = libm::atan2(ra.perp_dot(rb), ra.dot(rb));
-    match turn {
-        Turn::Clockwise if angle >= -5e-7 => angle -= std::f64::consts::TAU,
-        Turn::CounterClockwise if angle <= 5e-7 => angle += std::f64::consts::TAU,
-        _ => {}
-    }
+    let angle = sweep(turn, ra, rb);
     let chord = 2.0 * (arc_tolerance_mm * (2.0 * radius - arc_tolerance_mm)).max(0.0).sqrt();
     let n = if chord > 0.0 { (0.5 * angle * radius / (0.5 * chord)).abs().floor() } else { 0.0 };
     let n = (n as usize).clamp(1, 1_000_000);

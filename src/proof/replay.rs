@@ -230,7 +230,10 @@ impl Case<'_> {
                         self.fail(FailureKind::EndInWood, e.line, m.to, -m.to.z, 0.0);
                     }
                 }
-                EventKind::Dwell { .. } => {}
+                EventKind::Dwell { .. }
+                | EventKind::Tool { .. }
+                | EventKind::Stop { .. }
+                | EventKind::Coolant { .. } => {}
             }
         }
         if self.part.closes && (running || !ended) {
@@ -477,6 +480,8 @@ impl Case<'_> {
                     EventKind::SpindleOn { .. } => (running, waited_s) = (true, 0.0),
                     EventKind::SpindleOff | EventKind::End => running = false,
                     EventKind::Dwell { seconds } => waited_s += seconds,
+                    EventKind::Tool { .. } | EventKind::Stop { .. } | EventKind::Coolant { .. } => {
+                    }
                 }
             }
             if let Some(removed_mm) = still.add(!running, m, *c) {

@@ -20,9 +20,12 @@ pub fn run(program: &Program, line_bytes: &[usize], planner: &mut Planner) {
             send(planner, e.line);
             match e.kind {
                 EventKind::Dwell { seconds } => planner.dwell(seconds),
-                EventKind::SpindleOn { .. } | EventKind::SpindleOff | EventKind::End => {
-                    planner.sync();
-                }
+                EventKind::SpindleOn { .. }
+                | EventKind::SpindleOff
+                | EventKind::Tool { .. }
+                | EventKind::Stop { .. }
+                | EventKind::Coolant { .. }
+                | EventKind::End => planner.sync(),
             }
         }
         if let Some(mv) = program.moves.get(k) {

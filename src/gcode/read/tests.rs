@@ -1,4 +1,5 @@
 use super::*;
+use crate::geom::{DVec2, MoveKind};
 use proptest::prelude::*;
 
 fn machine() -> Machine {

@@ -53,8 +53,8 @@ pub(super) struct Line {
     open: u32,
     /// Value and column of each letter seen.
     values: [f64; 26],
-    columns: [u8; 26],
-    first_column: u8,
+    columns: [u32; 26],
+    first_column: u32,
 }
 
 impl Line {
@@ -63,25 +63,41 @@ impl Line {
         self.seen == 0
     }
 
+    /// True when X, Y and Z are the only letters of the line.
+    #[inline]
+    pub(super) fn has_axes_alone(&self) -> bool {
+        self.seen & !(bit(b'X') | bit(b'Y') | bit(b'Z')) == 0
+    }
+
     /// Column of the first word.
     pub(super) fn first_column(&self) -> u32 {
-        u32::from(self.first_column)
+        self.first_column
     }
 
     /// Column of the word with this letter (the last one for G and M).
     pub(super) fn column(&self, letter: u8) -> u32 {
-        u32::from(self.columns[usize::from(letter - b'A')])
+        self.columns[usize::from(letter - b'A')]
     }
 
     /// The value of a word, marked as used.
     #[inline]
     pub(super) fn take(&mut self, letter: u8) -> Option<f64> {
-        let bit = 1 << (letter - b'A');
-        if self.open & bit == 0 {
+        if !self.has(letter) {
             return None;
         }
-        self.open &= !bit;
+        self.open &= !bit(letter);
         Some(self.values[usize::from(letter - b'A')])
+    }
+
+    /// The value of a word that nothing has taken.
+    pub(super) fn value(&self, letter: u8) -> Option<f64> {
+        self.has(letter).then(|| self.values[usize::from(letter - b'A')])
+    }
+
+    /// True when a word with this letter stands on the line and nothing has taken it.
+    #[inline]
+    pub(super) fn has(&self, letter: u8) -> bool {
+        self.open & bit(letter) != 0
     }
 
     /// A letter that nothing has taken.
@@ -90,7 +106,7 @@ impl Line {
     }
 
     /// Forgets the last line. Values and columns stay: nobody asks for those of letters not seen.
-    fn clear(&mut self) {
+    pub(super) fn clear(&mut self) {
         (self.motion, self.plane, self.distance) = (None, None, None);
         (self.inches, self.spindle) = (None, None);
         (self.dwell, self.end) = (false, false);
@@ -100,35 +116,56 @@ impl Line {
 
     /// Notes a word; the error is the fault of it.
     #[inline]
-    fn add(&mut self, letter: u8, column: u8, value: f64) -> Result<(), fn(String) -> Fault> {
-        let k = usize::from(letter - b'A');
-        let bit = 1_u32 << k;
-        if self.seen == 0 {
-            self.first_column = column;
-        }
-        self.columns[k] = column;
+    pub(super) fn add(
+        &mut self,
+        letter: u8,
+        column: u32,
+        value: f64,
+    ) -> Result<(), fn(String) -> Fault> {
         match letter {
             b'G' => {
-                self.seen |= bit;
+                self.mark(letter, column);
                 self.add_g(value)
             }
             b'M' => {
-                self.seen |= bit;
+                self.mark(letter, column);
                 self.add_m(value)
             }
             b'X' | b'Y' | b'Z' | b'I' | b'J' | b'K' | b'R' | b'F' | b'S' | b'T' | b'P' => {
-                if self.seen & bit != 0 {
-                    return Err(Fault::Repeated);
-                }
-                self.seen |= bit;
-                self.open |= bit;
-                self.values[k] = value;
-                Ok(())
+                self.add_value(letter, column, value)
             }
             _ => Err(Fault::UnknownWord),
         }
     }
 
+    /// Notes that a letter stands on the line, and where.
+    #[inline]
+    pub(super) fn mark(&mut self, letter: u8, column: u32) {
+        if self.seen == 0 {
+            self.first_column = column;
+        }
+        self.seen |= bit(letter);
+        self.columns[usize::from(letter - b'A')] = column;
+    }
+
+    /// Notes a letter whose value something on the line has to take.
+    #[inline]
+    pub(super) fn add_value(
+        &mut self,
+        letter: u8,
+        column: u32,
+        value: f64,
+    ) -> Result<(), fn(String) -> Fault> {
+        if self.seen & bit(letter) != 0 {
+            return Err(Fault::Repeated);
+        }
+        self.mark(letter, column);
+        self.open |= bit(letter);
+        self.values[usize::from(letter - b'A')] = value;
+        Ok(())
+    }
+
+    #[inline]
     fn add_g(&mut self, value: f64) -> Result<(), fn(String) -> Fault> {
         match code(value) {
             Some(0) => once(&mut self.motion, Motion::Rapid),
@@ -158,6 +195,11 @@ impl Line {
             _ => Err(Fault::UnknownWord),
         }
     }
+}
+
+/// The bit of a letter, A the lowest.
+const fn bit(letter: u8) -> u32 {
+    1 << (letter - b'A')
 }
 
 fn code(value: f64) -> Option<u32> {
@@ -194,12 +236,12 @@ pub(super) fn next_line(text: &[u8], line: &mut Line) -> Result<usize, (u32, Fau
             b'(' => at = comment(text, at, Some(b')'))?,
             b';' => at = comment(text, at, None)?,
             b'A'..=b'Z' | b'a'..=b'z' if at < MAX_LINE => {
-                let column = at as u8 + 1;
+                let column = at as u32 + 1;
                 let Some((value, next)) = number(text, at + 1) else {
-                    return Err((u32::from(column), Fault::BadNumber(word_at(text, at))));
+                    return Err((column, Fault::BadNumber(word_at(text, at))));
                 };
                 line.add(c.to_ascii_uppercase(), column, value)
-                    .map_err(|fault| (u32::from(column), fault(word_at(text, at))))?;
+                    .map_err(|fault| (column, fault(word_at(text, at))))?;
                 at = next;
             }
             _ if !is_plain(c) => return Err(bad_character(text, at)),
@@ -246,7 +288,7 @@ fn bad_character(text: &[u8], at: usize) -> (u32, Fault) {
 
 /// A number as GRBL reads it: sign, digits, point. Its value and where it ends.
 #[inline]
-fn number(text: &[u8], from: usize) -> Option<(f64, usize)> {
+pub(super) fn number(text: &[u8], from: usize) -> Option<(f64, usize)> {
     let mut at = from;
     while matches!(text.get(at), Some(b' ' | b'\t')) {
         at += 1;
@@ -262,23 +304,32 @@ fn number(text: &[u8], from: usize) -> Option<(f64, usize)> {
         }
         _ => false,
     };
-    let (mut mantissa, mut digits, mut point) = (0_u64, 0, None);
-    loop {
-        match text.get(at) {
-            Some(&c @ b'0'..=b'9') => {
-                mantissa = mantissa.wrapping_mul(10).wrapping_add(u64::from(c - b'0'));
-                digits += 1;
-            }
-            Some(b'.') if point.is_none() => point = Some(digits),
-            _ => break,
-        }
-        at += 1;
+    let mut mantissa = 0;
+    let begin = at;
+    at = digits(text, at, &mut mantissa);
+    let (mut count, mut decimals) = (at - begin, 0);
+    if text.get(at) == Some(&b'.') {
+        let point = at;
+        at = digits(text, at + 1, &mut mantissa);
+        decimals = at - point - 1;
+        count += decimals;
     }
-    if digits == 0 || digits > MAX_DIGITS {
+    if count == 0 || count > MAX_DIGITS {
         return None;
     }
-    let value = mantissa as f64 / POW10[digits - point.unwrap_or(digits)];
+    // So few digits are no negative number, and signed ones convert faster.
+    let value = mantissa as i64 as f64 / POW10[decimals];
     Some((if negative { -value } else { value }, at))
+}
+
+/// Appends the digits at a place to a number, and gives where they end.
+#[inline]
+fn digits(text: &[u8], mut at: usize, number: &mut u64) -> usize {
+    while let Some(digit) = text.get(at).map(|c| c.wrapping_sub(b'0')).filter(|d| *d < 10) {
+        *number = number.wrapping_mul(10).wrapping_add(u64::from(digit));
+        at += 1;
+    }
+    at
 }
 
 /// The word at a place, for messages.

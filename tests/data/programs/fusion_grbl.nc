@@ -1,0 +1,32 @@
+(Box lid)
+(T1  D=6. CR=0. - ZMIN=-3. - flat end mill)
+G90 G94
+G17
+G21
+G28 G91 Z0
+G90
+
+(2D Pocket1)
+T1
+S18000 M3
+G54
+G0 X45. Y30.
+Z15.
+G1 Z1. F600.
+G3 X35. Y30. Z0. I-5. J0. F900.
+X45. Z-1. I5. J0.
+X35. Z-2. I-5.
+X45. Z-3. I5.
+X35. I-5.
+X45. I5.
+G1 X40.
+G18 G3 X39.4 Z-2.4 I0. K0.6
+G0 Z15.
+G17
+M9
+M5
+G28 G91 Z0
+G90
+G28 G91 X0 Y0
+G90
+M30
