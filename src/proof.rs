@@ -113,6 +113,8 @@ pub struct Verdict {
     pub carved: Heightfield,
     /// Distance of the carved surface from the target at each node, mm: positive = leftover, negative = gouge.
     pub deviation: Vec<f32>,
+    /// True at nodes of the stock where only a smaller cutter would come within `scallop_mm` of the target.
+    pub unreachable: Vec<bool>,
 }
 
 impl Verdict {
@@ -159,6 +161,7 @@ pub fn prove(
         programs: replay.reports,
         carved: replay.carved,
         deviation: held.deviation,
+        unreachable: held.unreachable,
     })
 }
 

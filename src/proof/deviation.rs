@@ -103,6 +103,7 @@ impl Tally {
 /// What comparing node by node found.
 pub(super) struct Held {
     pub(super) deviation: Vec<f32>,
+    pub(super) unreachable: Vec<bool>,
     pub(super) leftover: Leftover,
     over: Tally,
     rows: Vec<RowFound>,
@@ -134,12 +135,14 @@ pub(super) fn hold(
     let limit = tolerance.scallop_mm + tolerance.gouge_mm;
     let stock = job.stock.bounds().grown(1e-9);
     let mut deviation = vec![0.0_f32; grid.len()];
+    let mut unreachable = vec![false; grid.len()];
     let rows: Vec<RowFound> = deviation
         .par_chunks_mut(grid.nx)
+        .zip(unreachable.par_chunks_mut(grid.nx))
         .enumerate()
-        .map(|(j, out)| {
+        .map(|(j, (out, beyond))| {
             let mut row = RowFound::default();
-            for (i, out) in out.iter_mut().enumerate() {
+            for (i, (out, beyond)) in out.iter_mut().zip(beyond).enumerate() {
                 let p = grid.node(i, j);
                 let (c, t) = (f64::from(carved.at(i, j)), f64::from(target.at(i, j)));
                 let at = p.extend(c);
@@ -161,6 +164,7 @@ pub(super) fn hold(
                 let r = f64::from(reach.at(i, j));
                 let comes_near = r - t <= tolerance.scallop_mm
                     || terrain.distance(p.extend(r)) <= tolerance.scallop_mm;
+                *beyond = !comes_near;
                 if comes_near { &mut row.reachable } else { &mut row.unreachable }
                     .push(left as f32);
                 if left > limit && c > r {
@@ -174,7 +178,7 @@ pub(super) fn hold(
         })
         .collect();
     let (leftover, over) = leftover(&rows);
-    Held { deviation, leftover, over, rows }
+    Held { deviation, unreachable, leftover, over, rows }
 }
 
 fn leftover(rows: &[RowFound]) -> (Leftover, Tally) {
