@@ -16,6 +16,7 @@
 //! | `skeleton` | `Region` -> resampled rings, constrained Delaunay triangles, classes T/S/J, cells, runs, spine | geom job outline |
 //! | `surface` | region + cells + layer settings -> `Mesh` or height field; one file per method | geom job outline skeleton |
 //! | `relief` | layers' surfaces -> the relief heightfield: rasterise, combine, blend, background: the *target* | geom job outline surface |
+//! | `heights` | height images (PNG) and meshes (STL) from elsewhere -> a `Heightfield` | geom |
 //! | `compare` | one artwork, or the known shapes of the tables, raised by every method -> what each surface measures | geom job outline skeleton surface relief |
 //! | `offset` | heightfield x cutter -> tool-tip field and exact drops at points | geom job cutter relief |
 //! | `stock` | the wood as a heightfield; removes plain moves of a cutter from it | geom job cutter |
@@ -38,6 +39,7 @@ pub mod outline;
 pub mod skeleton;
 pub mod surface;
 pub mod relief;
+pub mod heights;
 pub mod compare;
 pub mod offset;
 pub mod stock;

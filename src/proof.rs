@@ -130,6 +130,8 @@ pub struct Verdict {
     /// Distance of the carved surface from the target at each node, mm: positive = leftover, negative = gouge. Empty
     /// without a target.
     pub deviation: Vec<f32>,
+    /// True at nodes of the stock where only a smaller cutter would come within `scallop_mm` of the target.
+    pub unreachable: Vec<bool>,
 }
 
 /// What the wood should become.
@@ -167,11 +169,11 @@ pub fn prove(
     };
     let parts = programs.iter().map(read_one).collect::<Result<Vec<_>, _>>()?;
     let wanted = Some(Wanted { target, reach });
-    judge(&parts, &Setup::from(job), *target.grid(), wanted, &mut |_, _| {})
+    judge(&parts, &Setup::from(job), *target.grid(), wanted)
 }
 
 /// Replays parts of programs on a fresh blank over `grid`, in order, and holds what they leave against what is wanted, if
-/// that is known. `watch` sees the wood after each part, and the part's index.
+/// that is known.
 ///
 /// # Errors
 /// [`ProofError::NoOperation`], [`ProofError::BadTarget`].
@@ -180,7 +182,6 @@ pub fn judge(
     setup: &Setup,
     grid: Grid,
     wanted: Option<Wanted>,
-    watch: &mut dyn FnMut(usize, &Heightfield),
 ) -> Result<Verdict, ProofError> {
     let usable = |h: &Heightfield| {
         *h.grid() == grid && h.range().is_some_and(|r| r.0.is_finite() && r.1.is_finite())
@@ -189,7 +190,7 @@ pub fn judge(
         return Err(ProofError::BadTarget);
     }
     let mut ledger = Ledger::default();
-    let replay = replay::replay(parts, setup, grid, &mut ledger, watch)?;
+    let replay = replay::replay(parts, setup, grid, &mut ledger)?;
     let tracks: Vec<Track> =
         parts.iter().map(|p| Track { cutter: &p.cutter, moves: &p.program.moves }).collect();
     let mut gouge = None;
@@ -214,6 +215,7 @@ pub fn judge(
         programs: replay.reports,
         carved: replay.carved,
         deviation: held.deviation,
+        unreachable: held.unreachable,
     })
 }
 

@@ -6,9 +6,11 @@
 //! ```text
 //!   Heightfield --> shaded_png     plaster or wood under one sun and a sky, for people
 //!               --> depth_png      16-bit grey, one pixel a node, for machines
-//!               --> stl            closed solid
+//!               --> stl, obj       closed solid
 //!   deviation   --> deviation_png  what is left above the target or cut below it
-//!   moves       --> paths_png      toolpaths over the board, coloured by depth
+//!   moves       --> paths_png      toolpaths over the board, coloured by depth or by feed
+//!   lines       --> sections_png   cross-sections: design, carved, stock and cutter
+//!   stages      --> steps_png      the stock before and after each program, and what it removed
 //!   ReportData  --> html, summary  the whole job on one page, and in a dozen lines
 //!   SideBySide  --> surfaces_png, surfaces_html, surfaces_text   one artwork by every method
 //! ```
@@ -21,11 +23,15 @@ mod font;
 mod grain;
 mod html;
 mod light;
+mod obj;
 mod paths;
 mod plane;
 mod scale;
+mod section;
 mod shade;
 mod skeleton;
+mod solid;
+mod steps;
 mod stl;
 mod strokes;
 mod summary;
@@ -37,12 +43,19 @@ pub use data::{
 pub use depth::depth_png;
 pub use deviation::{DeviationScale, deviation_png};
 pub use html::html;
-pub use paths::paths_png;
+pub use obj::obj;
+pub use paths::{Board, ColorBy, paths_png};
+pub use section::{Cut, CutterIn, Sections, sections_png};
 pub use shade::{Look, shaded_png};
 pub use skeleton::skeleton_svg;
-pub use stl::{stl, stl_every_nth_node};
+pub use solid::mesh_every_nth_node;
+pub use steps::{Step, stages, steps_png};
+pub use stl::stl;
 pub use summary::summary;
 pub use surfaces::{SideBySide, surface_png, surfaces_html, surfaces_png, surfaces_text};
+
+use crate::geom::{Bounds, DVec2};
+use data::short;
 
 /// Why a picture or a mesh cannot be made.
 #[derive(Debug, thiserror::Error)]
@@ -75,6 +88,21 @@ pub enum ReportError {
         what: &'static str,
         /// Its value.
         value: f64,
+    },
+    /// A cross-section without length, or one that leaves the stock.
+    #[error(
+        "the cross-section from x {} y {} to x {} y {} has no length or leaves the stock, which reaches from \
+         x {} y {} to x {} y {} mm; choose two places inside it",
+        short(.from.x), short(.from.y), short(.to.x), short(.to.y), short(.stock.min.x), short(.stock.min.y),
+        short(.stock.max.x), short(.stock.max.y)
+    )]
+    BadLine {
+        /// Where it begins, mm.
+        from: DVec2,
+        /// Where it ends, mm.
+        to: DVec2,
+        /// The stock, mm.
+        stock: Bounds,
     },
     /// The solid would be turned inside out.
     #[error(

@@ -89,18 +89,25 @@ cutter = "ball-3"
 scallop_mm = 0.02
 "#;
 
-const OUTPUTS: [&str; 10] = [
+const OUTPUTS: [&str; 14] = [
     "1-rough-flat-6.nc",
     "2-finish-ball-3.nc",
+    "carved-depth.png",
     "carved.png",
     "depth.png",
     "deviation.png",
+    "feeds.png",
     "job.toml",
     "paths.png",
     "relief.png",
     "relief.stl",
     "report.html",
+    "sections.png",
+    "steps.png",
 ];
+
+/// What `--meshes` adds.
+const MESHES: [&str; 3] = ["carved.obj", "carved.stl", "relief.obj"];
 
 fn leaf_desk() -> Desk {
     let desk = Desk::new();
@@ -119,18 +126,22 @@ fn a_job_file_gives_all_outputs() {
         let bytes = &files[&format!("leaf-carving/{name}")];
         assert!(!bytes.is_empty(), "{name}");
     }
+    assert!(MESHES.iter().all(|name| !files.contains_key(&format!("leaf-carving/{name}"))));
     let left: Vec<_> = files.keys().filter(|n| n.contains(".relievo")).collect();
     assert!(left.is_empty(), "{left:?}");
 }
 
 #[test]
-fn debug_pictures_show_the_skeletons_of_layers_with_a_crest() {
+fn debug_pictures_and_meshes_are_added_on_request() {
     let desk = leaf_desk();
     let job = LEAF_JOB.replace("height_mm = 3.5", "height_mm = 3.5\nsurface = \"profile\"");
     desk.put("leaf.toml", &job);
-    let out = desk.run(&["carve", "leaf.toml", "--debug-pictures"]);
+    let out = desk.run(&["carve", "leaf.toml", "--debug-pictures", "--meshes"]);
     assert_eq!(out.status.code(), Some(0), "{}", stderr(&out));
     let files = desk.files();
+    for name in MESHES {
+        assert!(files[&format!("leaf-carving/{name}")].len() > 10_000, "{name}");
+    }
     let drawing = String::from_utf8(files["leaf-carving/skeleton-1.svg"].clone()).unwrap();
     for part in ["<svg", "rungs", "spine", "sleeve triangles", "</svg>"] {
         assert!(drawing.contains(part), "{part}");

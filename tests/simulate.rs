@@ -139,7 +139,9 @@ fn the_job_beside_our_programs_is_found_and_pictures_are_written() {
     let said = String::from_utf8_lossy(&out.stdout);
     assert_eq!(out.status.code(), Some(0), "{}", String::from_utf8_lossy(&out.stderr));
     assert!(said.contains("job beside the programs") && said.contains("passed"), "{said}");
-    for name in ["carved.png", "deviation.png", "paths.png"] {
+    let pictures =
+        ["carved.png", "deviation.png", "feeds.png", "paths.png", "sections.png", "steps.png"];
+    for name in pictures {
         let file = desk.path().join("1-rough-flat-6-simulated").join(name);
         assert!(std::fs::read(file).unwrap().starts_with(b"\x89PNG"), "{name}");
     }
@@ -333,6 +335,90 @@ fn what_is_not_known_is_asked_for() {
     let files: Vec<PathBuf> =
         std::fs::read_dir(desk.path()).unwrap().map(|e| e.unwrap().path()).collect();
     assert_eq!(files, [desk.path().join("slot.nc")], "a refused run writes nothing");
+}
+
+fn example(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/programs").join(name)
+}
+
+/// Programs in the styles of many post-processors are read and pass.
+#[test]
+fn programs_from_elsewhere_pass() {
+    let desk = tempfile::tempdir().unwrap();
+    // Name, its parts with their cutters, and the lowest place in mm.
+    let cases: [(&str, &[&str], f64); 9] = [
+        ("carbide_create.nc", &["flat-6", "ball-3"], -2.0),
+        ("freecad.ngc", &["flat-6"], -2.0),
+        ("fusion_fanuc.nc", &["flat-3", "flat-6"], -9.0),
+        ("fusion_grbl.nc", &["flat-6"], -3.0),
+        ("hand_drill_inch.nc", &["flat-6"], -6.35),
+        ("linuxcnc.ngc", &["flat-6"], -1.5),
+        ("lower_case.nc", &["flat-6"], -1.0),
+        ("mach3_inch.tap", &["flat-6", "flat-3"], -12.7),
+        ("vectric_inch.tap", &["flat-6"], -3.175),
+    ];
+    for (name, cutters, lowest_mm) in cases {
+        let file = example(name);
+        let mut args = vec!["simulate", file.to_str().unwrap(), "--dry", "--json"];
+        args.extend(["--machine", "1325", "--cutter", "flat-6", "--tool", "301=ball-3"]);
+        args.extend(["--tool", "3=flat-3", "--tool", "4=flat-3"]);
+        let out = relievo(desk.path(), &args);
+        let err = String::from_utf8_lossy(&out.stderr);
+        assert_eq!(out.status.code(), Some(0), "{name}: {err}");
+        let json: serde_json::Value = serde_json::from_slice(&out.stdout).unwrap();
+        let programs = json["programs"].as_array().unwrap();
+        let found: Vec<_> = programs.iter().map(|p| p["cutter"].as_str().unwrap()).collect();
+        assert_eq!(found, cutters, "{name}");
+        let lowest = programs.iter().map(|p| p["lowest_mm"].as_f64().unwrap());
+        assert!((lowest.fold(0.0, f64::min) - lowest_mm).abs() < 1e-9, "{name}");
+    }
+}
+
+/// A program that has lost its G20, held against what it should have made.
+#[test]
+fn lost_units_are_caught_by_the_target() {
+    let desk = tempfile::tempdir().unwrap();
+    let text = std::fs::read_to_string(example("broken/inch_without_g20.nc")).unwrap();
+    std::fs::write(desk.path().join("good.nc"), text.replacen("G17", "G20 G17", 1)).unwrap();
+    std::fs::write(desk.path().join("bad.nc"), text).unwrap();
+    let stock = ["--stock", "90x80x12", "--cutter", "flat-6", "--pitch", "0.2"];
+    let with = |more: &[&str]| {
+        let mut args = vec!["simulate"];
+        args.extend(more);
+        args.extend(stock);
+        relievo(desk.path(), &args)
+    };
+    let out = with(&["good.nc", "--out", "good"]);
+    assert_eq!(out.status.code(), Some(0), "{}", String::from_utf8_lossy(&out.stderr));
+    // What the good one leaves is the target, by its own picture of heights.
+    for (name, passes) in [("good.nc", true), ("bad.nc", false)] {
+        let out = with(&[name, "--target", "good/carved-depth.png", "--json", "--dry"]);
+        let json: serde_json::Value = serde_json::from_slice(&out.stdout).unwrap();
+        assert!(json["gouge"].is_null() || json["gouge"]["depth_mm"].as_f64().unwrap() < 0.01);
+        let over = json["leftover"]["over_fraction"].as_f64().unwrap();
+        assert_eq!(over == 0.0, passes, "{name}: {over}");
+    }
+}
+
+#[test]
+fn a_mesh_serves_as_the_target() {
+    let desk = tempfile::tempdir().unwrap();
+    std::fs::write(desk.path().join("slot.nc"), SLOT).unwrap();
+    let own = ["--cutter", "flat-6", "--stock", "50x20x8", "--pitch", "0.2"];
+    let mut args = vec!["simulate", "slot.nc", "--meshes", "--out", "first"];
+    args.extend(own);
+    assert_eq!(relievo(desk.path(), &args).status.code(), Some(0));
+    let mut args = vec!["simulate", "slot.nc", "--target", "first/carved.stl", "--json", "--dry"];
+    args.extend(own);
+    let out = relievo(desk.path(), &args);
+    assert_eq!(out.status.code(), Some(0), "{}", String::from_utf8_lossy(&out.stderr));
+    let json: serde_json::Value = serde_json::from_slice(&out.stdout).unwrap();
+    assert!(json["leftover"]["all"]["max_mm"].as_f64().unwrap() < 1e-4);
+    // A deeper slot gouges the mesh: the line that went too deep is named.
+    std::fs::write(desk.path().join("slot.nc"), SLOT.replace("Z-2", "Z-2.05")).unwrap();
+    let out = relievo(desk.path(), &args);
+    let err = String::from_utf8_lossy(&out.stderr);
+    assert!(out.status.code() == Some(4) && err.contains("0.050 mm into the target"), "{err}");
 }
 
 /// The number behind a letter, outside comments.

@@ -2,6 +2,7 @@
 
 use super::files::{self, EarlierPrograms, Outputs};
 use super::observe::{self, Stages};
+use super::outcome::Meshes;
 use super::{Stop, inputs, memory, outcome};
 use crate::outline::Region;
 use crate::report::skeleton_svg;
@@ -32,6 +33,10 @@ pub(super) struct Args {
     #[arg(long)]
     debug_pictures: bool,
 
+    /// Also write the carved stock as carved.stl, and design and carved stock as relief.obj and carved.obj
+    #[arg(long)]
+    meshes: bool,
+
     /// Print the result as JSON
     #[arg(long)]
     json: bool,
@@ -56,7 +61,8 @@ pub(super) fn run(args: &Args) -> Result<(), Stop> {
     }
     stages.enter("pictures");
     let again = files::name_from(&folder, &input.artwork_file)?;
-    let (data, made) = outcome::outputs(&carving, &again)?;
+    let meshes = if args.meshes { Meshes::All } else { Meshes::Design };
+    let (data, made) = outcome::outputs(&carving, &again, meshes)?;
     if args.debug_pictures {
         for (name, svg) in skeletons(&carving.design) {
             outputs.add(&name, svg.as_bytes())?;

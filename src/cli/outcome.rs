@@ -3,11 +3,12 @@
 use super::Stop;
 use crate::CarveError;
 use crate::Carving;
+use crate::cutter::Profile;
 use crate::job::{CutterShape, Job, SurfaceSpec};
 use crate::proof::{FailureKind, ProofError, Quantiles};
 use crate::report::{
-    self, Check, CutterRow, DeviationScale, LayerRow, LeftoverRow, Look, Picture, ProgramRow,
-    ReportData, ReportError, StockFacts,
+    self, Board, Check, ColorBy, Cut, CutterIn, CutterRow, DeviationScale, LayerRow, LeftoverRow,
+    Look, Picture, ProgramRow, ReportData, ReportError, Sections, Step, StockFacts,
 };
 use crate::toolpath::ToolpathError;
 use rayon::prelude::*;
@@ -46,64 +47,166 @@ pub(super) fn failure(carving: &Carving, earlier: &[PathBuf]) -> String {
     text
 }
 
+/// Whether meshes are written beyond the design's STL: each takes up to 60 MB.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Meshes {
+    /// The design as STL.
+    Design,
+    /// Design and carved stock, each as STL and OBJ.
+    All,
+}
+
 /// All files of the run, and the data of its report. `artwork` is how a job file beside them names the artwork.
 pub(super) fn outputs(
     carving: &Carving,
     artwork: &str,
+    meshes: Meshes,
 ) -> Result<(ReportData, Vec<Made>), ReportError> {
+    let mut files = drawn(carving, meshes)?;
+    let mut data = report_data(carving);
+    data.pictures = pictures(&files);
+    files.push(("report.html".into(), report::html(&data).into_bytes()));
+    let mut again = carving.design.job.clone();
+    again.artwork.file = artwork.to_string();
+    files.push(("job.toml".into(), again.to_toml().into_bytes()));
+    files.extend(carving.programs.iter().map(|p| (p.name.clone(), p.text.clone().into_bytes())));
+    Ok((data, files))
+}
+
+/// Pictures and meshes.
+fn drawn(carving: &Carving, meshes: Meshes) -> Result<Vec<Made>, ReportError> {
     let design = &carving.design;
     let (job, target) = (&design.job, &design.relief.target);
     let verdict = &carving.verdict;
     let wood = Look::of_wood(&job.stock.wood.name, job.stock.grain_rad);
-    let paths: Vec<_> = carving
-        .programs
-        .iter()
-        .zip(&carving.paths)
-        .map(|(p, path)| (p.name.as_str(), path.moves.as_slice()))
-        .collect();
+    let runs = || carving.programs.iter().zip(&carving.paths);
+    let paths: Vec<_> = runs().map(|(p, path)| (p.name.as_str(), path.moves.as_slice())).collect();
     let limits =
         DeviationScale { gouge_mm: job.tolerance.gouge_mm, scallop_mm: job.tolerance.scallop_mm };
     let title = |what: &str| format!("{} - {what}", job.title);
-    let jobs: [(&str, &Make); 6] = [
-        ("relief.png", &|| report::shaded_png(target, Look::Plaster, Some(&title("relief")))),
-        ("carved.png", &|| report::shaded_png(&verdict.carved, wood, Some(&title("as carved")))),
-        ("deviation.png", &|| {
-            let title = title("deviation of the dry run");
-            report::deviation_png(&verdict.deviation, &verdict.carved, limits, &title)
-        }),
-        ("paths.png", &|| report::paths_png(&paths, &job.stock, &title("toolpaths"))),
-        ("depth.png", &|| report::depth_png(target)),
-        ("relief.stl", &|| {
-            let base = -job.stock.thickness_mm;
-            report::stl(target, base, report::stl_every_nth_node(target.grid()))
-        }),
+    let board = Board { bounds: job.stock.bounds(), top: Some(&verdict.carved) };
+    let base = -job.stock.thickness_mm;
+    let nth = report::mesh_every_nth_node(target.grid());
+    let mut jobs: Vec<(&str, Box<Make>)> = vec![
+        (
+            "relief.png",
+            Box::new(|| report::shaded_png(target, Look::Plaster, Some(&title("relief")))),
+        ),
+        (
+            "carved.png",
+            Box::new(|| report::shaded_png(&verdict.carved, wood, Some(&title("as carved")))),
+        ),
+        (
+            "deviation.png",
+            Box::new(|| {
+                let (title, out) = (title("deviation of the dry run"), &verdict.unreachable);
+                report::deviation_png(
+                    &verdict.deviation,
+                    Some(out),
+                    &verdict.carved,
+                    limits,
+                    &title,
+                )
+            }),
+        ),
+        (
+            "paths.png",
+            Box::new(|| {
+                report::paths_png(&paths, board, ColorBy::Depth, &title("toolpaths by depth"))
+            }),
+        ),
+        (
+            "feeds.png",
+            Box::new(|| {
+                report::paths_png(&paths, board, ColorBy::Feed, &title("toolpaths by feed"))
+            }),
+        ),
+        ("steps.png", Box::new(|| steps(carving, wood, &title("before and after each program")))),
+        ("sections.png", Box::new(|| sections(carving, wood, &title("cross-sections")))),
+        ("depth.png", Box::new(|| report::depth_png(target))),
+        ("carved-depth.png", Box::new(|| report::depth_png(&verdict.carved))),
+        ("relief.stl", Box::new(|| report::stl(target, base, nth))),
     ];
-    let mut files: Vec<Made> = jobs
-        .par_iter()
-        .map(|(name, make)| Ok(((*name).to_string(), make()?)))
-        .collect::<Result<_, ReportError>>()?;
-    let mut data = report_data(carving);
+    if meshes == Meshes::All {
+        jobs.push(("relief.obj", Box::new(|| report::obj(target, base, nth))));
+        jobs.push(("carved.stl", Box::new(|| report::stl(&verdict.carved, base, nth))));
+        jobs.push(("carved.obj", Box::new(|| report::obj(&verdict.carved, base, nth))));
+    }
+    jobs.par_iter().map(|(name, make)| Ok(((*name).to_string(), make()?))).collect()
+}
+
+/// The stock before and after each program.
+fn steps(carving: &Carving, look: Look, title: &str) -> Result<Vec<u8>, ReportError> {
+    let profiles: Vec<Profile> = carving.paths.iter().map(|p| Profile::of(&p.cutter)).collect();
+    let runs: Vec<_> =
+        profiles.iter().zip(&carving.paths).map(|(p, path)| (p, path.moves.as_slice())).collect();
+    let stock = &carving.design.job.stock;
+    let stages = report::stages(stock, carving.verdict.carved.grid(), &runs);
+    let names = carving.programs.iter().zip(&carving.paths);
+    let steps: Vec<Step<'_>> = names
+        .zip(stages.windows(2))
+        .map(|((program, path), stage)| Step {
+            name: &program.name,
+            cutter: &path.cutter.name,
+            before: &stage[0],
+            after: &stage[1],
+        })
+        .collect();
+    report::steps_png(&steps, look, title)
+}
+
+/// Cross-sections through the worst place, with the last cutter.
+fn sections(carving: &Carving, look: Look, title: &str) -> Result<Vec<u8>, ReportError> {
+    let (verdict, stock) = (&carving.verdict, &carving.design.job.stock);
+    let profile = carving.paths.last().map(|p| (&p.cutter.name, Profile::of(&p.cutter)));
+    let grid = verdict.carved.grid();
+    let view = Sections {
+        carved: &verdict.carved,
+        design: Some(&carving.design.relief.target),
+        deviation: Some(&verdict.deviation),
+        thickness_mm: stock.thickness_mm,
+        cutter: profile.as_ref().map(|(name, profile)| CutterIn { name, profile }),
+        cuts: &Cut::through_worst(&stock.bounds(), &verdict.deviation, grid),
+    };
+    report::sections_png(&view, look, title)
+}
+
+/// The pictures of the report, the most telling one first.
+fn pictures(files: &[Made]) -> Vec<Picture> {
     let picture = |name: &str, title: &str, caption: &str| Picture {
         title: title.into(),
         caption: caption.into(),
         png: files.iter().find(|f| f.0 == name).map(|f| f.1.clone()).unwrap_or_default(),
     };
-    data.pictures = vec![
+    vec![
         picture("carved.png", "As carved", "What the dry run of the programs leaves."),
         picture("relief.png", "Design", "The relief that the programs are held against."),
         picture(
             "deviation.png",
             "Deviation",
-            "Blue: wood left above the design. Red: cut below it.",
+            "Blue: wood left above the design. Ochre: left where only a smaller cutter would reach. Red: cut below it.",
         ),
-        picture("paths.png", "Toolpaths", "Feed moves by depth; rapids light."),
-    ];
-    files.push(("report.html".into(), report::html(&data).into_bytes()));
-    let mut again = job.clone();
-    again.artwork.file = artwork.to_string();
-    files.push(("job.toml".into(), again.to_toml().into_bytes()));
-    files.extend(carving.programs.iter().map(|p| (p.name.clone(), p.text.clone().into_bytes())));
-    Ok((data, files))
+        picture(
+            "sections.png",
+            "Cross-sections",
+            "Through the place with the largest deviation; there at true scale, with the last cutter.",
+        ),
+        picture(
+            "steps.png",
+            "Before and after",
+            "The stock before and after each program, and what it removed.",
+        ),
+        picture(
+            "paths.png",
+            "Toolpaths by depth",
+            "Feed moves by the depth of the tip; rapids dashed.",
+        ),
+        picture(
+            "feeds.png",
+            "Toolpaths by feed",
+            "Feed moves by the feed asked for; rapids dashed.",
+        ),
+    ]
 }
 
 fn report_data(carving: &Carving) -> ReportData {

@@ -103,6 +103,7 @@ impl Tally {
 /// What comparing node by node found.
 pub(super) struct Held {
     pub(super) deviation: Vec<f32>,
+    pub(super) unreachable: Vec<bool>,
     pub(super) leftover: Leftover,
     over: Tally,
     rows: Vec<RowFound>,
@@ -113,6 +114,7 @@ impl Held {
     pub(super) fn nothing() -> Self {
         Self {
             deviation: Vec::new(),
+            unreachable: Vec::new(),
             leftover: Leftover::default(),
             over: Tally::default(),
             rows: Vec::new(),
@@ -146,12 +148,14 @@ pub(super) fn hold(
     let limit = tolerance.scallop_mm + tolerance.gouge_mm;
     let stock = setup.stock.bounds().grown(1e-9);
     let mut deviation = vec![0.0_f32; grid.len()];
+    let mut unreachable = vec![false; grid.len()];
     let rows: Vec<RowFound> = deviation
         .par_chunks_mut(grid.nx)
+        .zip(unreachable.par_chunks_mut(grid.nx))
         .enumerate()
-        .map(|(j, out)| {
+        .map(|(j, (out, beyond))| {
             let mut row = RowFound::default();
-            for (i, out) in out.iter_mut().enumerate() {
+            for (i, (out, beyond)) in out.iter_mut().zip(beyond).enumerate() {
                 let p = grid.node(i, j);
                 let (c, t) = (f64::from(carved.at(i, j)), f64::from(target.at(i, j)));
                 let at = p.extend(c);
@@ -171,12 +175,8 @@ pub(super) fn hold(
                 let left = f64::from(out.max(0.0));
                 row.left = Spot::worse(row.left, Some(Spot { amount: left, at }));
                 let r = f64::from(reach.at(i, j));
-                if comes_near(&terrain, p.extend(t), r, tolerance.scallop_mm) {
-                    &mut row.reachable
-                } else {
-                    &mut row.unreachable
-                }
-                .push(left as f32);
+                *beyond = !comes_near(&terrain, p.extend(t), r, tolerance.scallop_mm);
+                if *beyond { &mut row.unreachable } else { &mut row.reachable }.push(left as f32);
                 if left > limit && c > r {
                     let above = if r > t { reached.distance(at) } else { left };
                     if above > limit {
@@ -188,7 +188,7 @@ pub(super) fn hold(
         })
         .collect();
     let (leftover, over) = leftover(&rows);
-    Held { deviation, leftover, over, rows }
+    Held { deviation, unreachable, leftover, over, rows }
 }
 
 /// True where a cutter that leaves the wood at height `reach` comes within a scallop of the target at `at`.

@@ -43,17 +43,16 @@ pub(super) struct Replay {
     pub(super) carved: Heightfield,
 }
 
-/// Replays all parts in order; `watch` sees the wood after each, and the part's place in the order.
+/// Replays all parts in order.
 pub(super) fn replay(
     parts: &[Part],
     setup: &Setup,
     grid: Grid,
     ledger: &mut Ledger,
-    watch: &mut dyn FnMut(usize, &Heightfield),
 ) -> Result<Replay, ProofError> {
     let mut block = Block::new(&setup.stock, grid);
     let mut reports = Vec::new();
-    for (k, part) in parts.iter().enumerate() {
+    for part in parts {
         let own = operations_of(part, setup)?;
         let most = |of: fn(&Operation) -> f64| own.iter().map(|o| of(o)).fold(0.0, f64::max);
         let mut case = Case {
@@ -66,7 +65,6 @@ pub(super) fn replay(
             ledger,
         };
         reports.push(case.run(&mut block));
-        watch(k, block.field());
     }
     check_travel(parts, setup, ledger);
     Ok(Replay { reports, carved: block.into_field() })
@@ -164,7 +162,7 @@ impl Case<'_> {
         ProgramReport {
             name: self.part.name.clone(),
             cutter: self.part.cutter.name.clone(),
-            lines: self.program.lines,
+            lines: self.program.lines - self.part.lines_before,
             moves: moves.len(),
             times,
             plunge_s: plunging.map(|(_, s)| s).sum(),
@@ -236,6 +234,8 @@ impl Case<'_> {
                 | EventKind::Coolant { .. } => {}
             }
         }
+        // M2 and M30 stop the spindle as well; our own programs do it themselves.
+        running &= self.setup.manners == Manners::Own;
         if self.part.closes && (running || !ended) {
             self.fail(FailureKind::NoEnd, self.program.lines, end, 0.0, 0.0);
         }

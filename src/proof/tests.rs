@@ -468,6 +468,8 @@ fn what_no_cutter_reaches_is_counted_apart() {
     assert!(v.passed(), "{:#?}", v.failures);
     assert_eq!(v.leftover.reachable.max_mm, 0.0);
     assert_eq!(v.leftover.unreachable.nodes, 201 * 5);
+    let in_crack = (0..grid.len()).map(|k| crack(grid.node(k % grid.nx, k / grid.nx)));
+    assert!(in_crack.eq(v.unreachable.iter().copied()));
     // The middle of the crack is 0.6 mm from the rims, which rise from 0.4 to 0.6 beside it.
     let rim = v.leftover.unreachable.max_mm;
     assert!(rim > 0.5 && rim < 0.6, "{rim}");
@@ -608,7 +610,7 @@ fn the_time_is_that_of_the_firmware() {
         let program = read::read(text, &job.machine, DVec3::ZERO).unwrap();
         let parts = [Part::whole("1", &job.operations[0].cutter, program)];
         let setup = Setup::from(&job);
-        let replay = replay::replay(&parts, &setup, grid, &mut ledger, &mut |_, _| {}).unwrap();
+        let replay = replay::replay(&parts, &setup, grid, &mut ledger).unwrap();
         let seconds = replay.reports[0].seconds;
         println!("{seconds:.3} s, firmware {firmware_s} s");
         assert!((seconds / firmware_s - 1.0).abs() < 0.01, "{seconds} s, firmware {firmware_s} s");

@@ -128,6 +128,20 @@ impl Canvas {
         self.pixmap.stroke_path(&path, &paint(color, 1.0), &stroke, Transform::identity(), None);
     }
 
+    /// Fills a polygon, whichever way round it runs.
+    pub(super) fn fill(&mut self, points: &[(f32, f32)], color: Rgb, opacity: f32) {
+        let Some((first, rest)) = points.split_first() else { return };
+        let mut builder = PathBuilder::new();
+        builder.move_to(first.0, first.1);
+        for p in rest {
+            builder.line_to(p.0, p.1);
+        }
+        builder.close();
+        let Some(path) = builder.finish() else { return };
+        let (paint, place) = (paint(color, opacity), Transform::identity());
+        self.pixmap.fill_path(&path, &paint, FillRule::Winding, place, None);
+    }
+
     /// Draws a circle with a pen, or fills it where `pen` is `None`.
     pub(super) fn circle(&mut self, (x, y): (f32, f32), radius: f32, pen: Option<f32>, color: Rgb) {
         let Some(path) = PathBuilder::from_circle(x, y, radius) else { return };

@@ -2,7 +2,7 @@
 
 use super::ReportError;
 use super::canvas::{Align, Canvas, FAINT_INK, INK, Image, Lettering, Rgb};
-use super::data::short;
+use super::data::{percent, short};
 use super::plane::Plane;
 use super::scale::{SoftScale, ramp, round_up};
 use super::shade::lit;
@@ -34,6 +34,14 @@ const LEFTOVER: [(f32, Rgb); 5] = [
     (1.6, [40, 104, 170]),
     (2.0, [26, 32, 92]),
 ];
+/// The same where only a smaller cutter would reach.
+const UNREACHED: [(f32, Rgb); 5] = [
+    (0.0, [236, 234, 226]),
+    (1.0, [238, 226, 184]),
+    (1.2, [232, 196, 92]),
+    (1.6, [198, 142, 16]),
+    (2.0, [112, 74, 0]),
+];
 /// Where nothing is known.
 const UNKNOWN: Rgb = [205, 203, 200];
 
@@ -46,13 +54,16 @@ struct Figures {
     /// Leftover of 50, 90, 99 and 100 % of the nodes, mm.
     leftover_mm: [f64; 4],
     known: usize,
+    /// Most that is left where the cutters reach, mm, and the part of the nodes where they do not; only where that is
+    /// known.
+    reached: Option<(f64, f64)>,
 }
 
-/// The deviation map as an RGB PNG: reds where wood is missing, blues where it is left, over a faint
-/// relief; a legend with ticks in mm and both limits, and the figures. The deepest gouge is ringed when
-/// it is beyond its limit.
+/// The deviation map as an RGB PNG: reds where wood is missing, blues where it is left, ochres where it is left
+/// because only a smaller cutter would reach, over a faint relief; a legend with ticks in mm and both limits, and the
+/// figures. The deepest gouge is ringed when it is beyond its limit.
 ///
-/// `deviation` holds mm normal to the target for every node of `field`, row-major, row 0 = lowest y:
+/// `unreachable` is true at nodes that the cutters cannot reach; `None` where nobody knows. `deviation` holds mm normal to the target for every node of `field`, row-major, row 0 = lowest y:
 /// above zero = left over, below = cut too deep, NaN = not known (hatched). The scale is even near zero
 /// and logarithmic further away, wide enough for the worst value. Where the map has fewer pixels than
 /// nodes, a pixel shows its deepest gouge if that is beyond the limit, else the mean.
@@ -62,20 +73,23 @@ struct Figures {
 /// [`ReportError::NotFinite`] for heights that are not numbers.
 pub fn deviation_png(
     deviation: &[f32],
+    unreachable: Option<&[bool]>,
     field: &Heightfield,
     limits: DeviationScale,
     title: &str,
 ) -> Result<Vec<u8>, ReportError> {
     let grid = field.grid();
-    if deviation.len() != grid.len() {
-        return Err(ReportError::Mismatch { got: deviation.len(), want: grid.len() });
+    for got in [Some(deviation.len()), unreachable.map(<[bool]>::len)].into_iter().flatten() {
+        if got != grid.len() {
+            return Err(ReportError::Mismatch { got, want: grid.len() });
+        }
     }
     for (what, value) in [("gouge_mm", limits.gouge_mm), ("scallop_mm", limits.scallop_mm)] {
         if !(value.is_finite() && value > 0.0) {
             return Err(ReportError::BadNumber { what, value });
         }
     }
-    let figures = Figures::of(deviation);
+    let figures = Figures::of(deviation, unreachable);
     let allowed = limits.scallop_mm + limits.gouge_mm;
     let scale = SoftScale {
         low: -round_up(figures.gouge_mm.max(2.0 * limits.gouge_mm)),
@@ -84,15 +98,19 @@ pub fn deviation_png(
     };
     let (plane, light) = lit(field, "deviation map")?;
     let shade: Vec<f32> = light.sun.iter().zip(&light.sky).map(|(a, b)| 0.5 * (a + b)).collect();
-    let image = colored(deviation, grid, &plane, &shade, &scale, limits);
+    let marks = Marks { deviation, unreachable };
+    let image = colored(marks, grid, &plane, &shade, &scale, limits);
 
     let unit = image.w.max(image.h) as f32 / 1600.0;
     let px = |n: f32| (n * unit).round();
     let margin = px(70.0);
     let page_w = (image.w as f32 + 2.0 * margin).max(px(1180.0));
-    let (top, left) = (px(206.0), ((page_w - image.w as f32) * 0.5).floor());
+    let reached = figures.reached_text();
+    // Both the figure and the legend take a line more.
+    let line = if reached.is_some() { px(40.0) } else { 0.0 };
+    let (top, left) = (px(206.0) + line, ((page_w - image.w as f32) * 0.5).floor());
     let bottom = top + image.h as f32;
-    let mut canvas = Canvas::new(page_w as usize, (bottom + px(250.0)) as usize)?;
+    let mut canvas = Canvas::new(page_w as usize, (bottom + px(250.0) + line) as usize)?;
     let room = page_w - 2.0 * margin;
     canvas.text_within(title, (margin, px(82.0)), Lettering::title(px(34.0)), room);
     let over = figures.gouge_mm > limits.gouge_mm;
@@ -101,6 +119,9 @@ pub fn deviation_png(
     let how_gouge = if over { how.colored(GOUGE[3].1) } else { how };
     canvas.text_within(&gouge, (margin, px(134.0)), how_gouge, room);
     canvas.text_within(&figures.leftover_text(), (margin, px(174.0)), how, room);
+    if let Some(reached) = reached {
+        canvas.text_within(&reached, (margin, px(214.0)), how, room);
+    }
     canvas.lay(&image, left as usize, top as usize);
     canvas.frame([left, top, image.w as f32, image.h as f32], px(2.0).max(1.0), FAINT_INK);
     if over {
@@ -110,13 +131,13 @@ pub fn deviation_png(
         canvas.circle((x, y), px(26.0), Some(px(9.0)), [255, 255, 255]);
         canvas.circle((x, y), px(26.0), Some(px(4.0)), GOUGE[4].1);
     }
-    let hatched = figures.known < grid.len();
-    legend(&mut canvas, [margin, bottom + px(104.0), room], unit, &scale, limits, hatched);
+    let shown = Shown { hatched: figures.known < grid.len(), parted: unreachable.is_some() };
+    legend(&mut canvas, [margin, bottom + px(104.0), room], unit, &scale, limits, shown);
     canvas.into_png(None)
 }
 
 impl Figures {
-    fn of(deviation: &[f32]) -> Self {
+    fn of(deviation: &[f32], unreachable: Option<&[bool]>) -> Self {
         let mut left: Vec<f32> = Vec::with_capacity(deviation.len());
         let (mut lowest, mut gouge_node) = (0.0_f32, 0);
         for (k, d) in deviation.iter().enumerate().filter(|(_, d)| d.is_finite()) {
@@ -134,7 +155,13 @@ impl Figures {
                 *value = f64::from(*left.select_nth_unstable_by(rank, f32::total_cmp).1);
             }
         }
-        Self { gouge_mm: f64::from(-lowest), gouge_node, leftover_mm, known }
+        let reached = unreachable.map(|unreachable| {
+            let pairs = || deviation.iter().zip(unreachable).filter(|(d, _)| d.is_finite());
+            let most = pairs().filter(|(_, out)| !**out).fold(0.0_f32, |most, (d, _)| most.max(*d));
+            let out = unreachable.iter().filter(|out| **out).count();
+            (f64::from(most), out as f64 / deviation.len().max(1) as f64)
+        });
+        Self { gouge_mm: f64::from(-lowest), gouge_node, leftover_mm, known, reached }
     }
 
     fn gouge_text(&self, grid: &Grid, limits: DeviationScale) -> String {
@@ -153,14 +180,28 @@ impl Figures {
         let [p50, p90, p99, max] = self.leftover_mm;
         format!("left over: p50 {p50:.3} · p90 {p90:.3} · p99 {p99:.3} · max {max:.3} mm")
     }
+
+    fn reached_text(&self) -> Option<String> {
+        let (most, part) = self.reached?;
+        let part = percent(1.0 - part);
+        Some(format!("where the cutters reach ({part} of the area): max {most:.3} mm"))
+    }
 }
 
-/// The colour of one value: each side of zero reaches 1 at its limit and 2 at the end of the scale.
-fn color_of(d: f64, scale: &SoftScale, limits: DeviationScale) -> Rgb {
+/// What is shown at the nodes.
+#[derive(Debug, Clone, Copy)]
+struct Marks<'a> {
+    deviation: &'a [f32],
+    unreachable: Option<&'a [bool]>,
+}
+
+/// The colour of one value: each side of zero reaches 1 at its limit and 2 at the end of the scale. `above` are the
+/// colours of what is left over.
+fn color_of(d: f64, scale: &SoftScale, limits: DeviationScale, above: &[(f32, Rgb); 5]) -> Rgb {
     let (limit, end, stops) = if d < 0.0 {
         (-limits.gouge_mm, scale.low, &GOUGE)
     } else {
-        (limits.scallop_mm + limits.gouge_mm, scale.high, &LEFTOVER)
+        (limits.scallop_mm + limits.gouge_mm, scale.high, above)
     };
     let [zero, at, limit, end] = [0.0, d, limit, end].map(|v| scale.position(v));
     let (d, limit, end) = ((at - zero).abs(), (limit - zero).abs(), (end - zero).abs());
@@ -170,7 +211,7 @@ fn color_of(d: f64, scale: &SoftScale, limits: DeviationScale) -> Rgb {
 }
 
 fn colored(
-    deviation: &[f32],
+    marks: Marks<'_>,
     grid: &Grid,
     plane: &Plane,
     shade: &[f32],
@@ -178,9 +219,10 @@ fn colored(
     limits: DeviationScale,
 ) -> Image {
     const STEPS: usize = 4096;
-    let table: Vec<Rgb> = (0..=STEPS)
-        .map(|k| color_of(scale.value(k as f64 / STEPS as f64), scale, limits))
-        .collect();
+    let tables = [&LEFTOVER, &UNREACHED].map(|above| -> Vec<Rgb> {
+        let value = |k: usize| scale.value(k as f64 / STEPS as f64);
+        (0..=STEPS).map(|k| color_of(value(k), scale, limits, above)).collect()
+    });
     let (w, h) = (plane.w, plane.h);
     let columns: Vec<(usize, usize)> = (0..w).map(|x| nodes_of(x, w, grid.nx)).collect();
     let mut rgb = vec![[0_u8; 3]; w * h];
@@ -188,7 +230,15 @@ fn colored(
         let (j0, j1) = nodes_of(h - 1 - y, h, grid.ny);
         for (x, pixel) in out.iter_mut().enumerate() {
             let (i0, i1) = columns[x];
-            let block = (j0..j1).flat_map(|j| &deviation[j * grid.nx + i0..j * grid.nx + i1]);
+            let runs = (j0..j1).map(|j| j * grid.nx + i0..j * grid.nx + i1);
+            let block = runs.clone().flat_map(|run| &marks.deviation[run]);
+            let table = match marks.unreachable {
+                Some(unreachable) => {
+                    let out = runs.flat_map(|run| &unreachable[run]).filter(|out| **out).count();
+                    &tables[usize::from(2 * out >= (j1 - j0) * (i1 - i0))]
+                }
+                None => &tables[0],
+            };
             let color = match worst_or_mean(block, limits.gouge_mm) {
                 Some(d) => {
                     // A gouge beyond its limit must not fade into the step of the table below it.
@@ -228,6 +278,15 @@ fn worst_or_mean<'a>(values: impl Iterator<Item = &'a f32>, gouge_mm: f64) -> Op
     }
 }
 
+/// What the legend has to explain.
+#[derive(Debug, Clone, Copy)]
+struct Shown {
+    /// Some places were not measured.
+    hatched: bool,
+    /// It is known where the cutters reach.
+    parted: bool,
+}
+
 /// The colour bar with its ticks below and the limits above.
 fn legend(
     canvas: &mut Canvas,
@@ -235,16 +294,16 @@ fn legend(
     unit: f32,
     scale: &SoftScale,
     limits: DeviationScale,
-    hatched: bool,
+    shown: Shown,
 ) {
     let px = |n: f32| (n * unit).round();
     let height = px(34.0);
     let (w, h) = (width as usize, height as usize);
     let mut rgb = Vec::with_capacity(w * h);
-    for _ in 0..h {
-        rgb.extend(
-            (0..w).map(|x| color_of(scale.value((x as f64 + 0.5) / w as f64), scale, limits)),
-        );
+    for y in 0..h {
+        let above = if shown.parted && y >= h / 2 { &UNREACHED } else { &LEFTOVER };
+        let value = |x: usize| scale.value((x as f64 + 0.5) / w as f64);
+        rgb.extend((0..w).map(|x| color_of(value(x), scale, limits, above)));
     }
     canvas.lay(&Image { w, h, rgb }, left as usize, top as usize);
     let pen = px(2.0).max(1.0);
@@ -262,17 +321,23 @@ fn legend(
     let low = top + height + px(84.0);
     canvas.text("too deep", (left, low), small.colored(GOUGE[3].1));
     let center = left + 0.5 * width;
-    let what = if hatched {
+    let what = if shown.hatched {
         "mm, normal to the target; hatched: not measured"
     } else {
         "mm, normal to the target"
     };
     canvas.text(what, (center, low), small.aligned(Align::Middle));
-    canvas.text(
-        "left over",
-        (left + width, low),
-        small.aligned(Align::Right).colored(LEFTOVER[3].1),
-    );
+    let right = small.aligned(Align::Right);
+    canvas.text("left over", (left + width, low), right.colored(LEFTOVER[3].1));
+    if shown.parted {
+        let at = (left + width, low + px(38.0));
+        let ochre = [150, 104, 8];
+        canvas.text(
+            "lower half of the bar: where only a smaller cutter would reach",
+            at,
+            right.colored(ochre),
+        );
+    }
     let allowed = limits.scallop_mm + limits.gouge_mm;
     let marks = [
         // The gouge limit stands so near the left end that its label begins there.
@@ -297,7 +362,7 @@ mod tests {
     fn figures_come_from_the_numbers_alone() {
         let mut d: Vec<f32> = (1..=100).map(|k| k as f32 * 0.001).collect();
         d.extend([f32::NAN, -0.25, -0.5]);
-        let f = Figures::of(&d);
+        let f = Figures::of(&d, None);
         assert_eq!((f.known, f.gouge_node), (102, 102));
         assert!((f.gouge_mm - 0.5).abs() < 1e-7);
         // 102 values, two of them zero: the 51st of the sorted list is 0.049.
@@ -305,7 +370,7 @@ mod tests {
         for (got, want) in f.leftover_mm.iter().zip(want) {
             assert!((got - want).abs() < 1e-6, "{got} {want}");
         }
-        assert_eq!(Figures::of(&[f32::NAN; 3]).known, 0);
+        assert_eq!(Figures::of(&[f32::NAN; 3], None).known, 0);
     }
 
     #[test]
@@ -318,7 +383,8 @@ mod tests {
         for node in [0, 1500, 3000, 3001 * 7 - 1] {
             let mut d = vec![0.0_f32; grid.len()];
             d[node] = -0.0101;
-            let image = colored(&d, &grid, &plane, &shade, &scale, LIMITS);
+            let marks = Marks { deviation: &d, unreachable: None };
+            let image = colored(marks, &grid, &plane, &shade, &scale, LIMITS);
             let red = image.rgb.iter().filter(|c| c[0] > 180 && c[1] < 120).count();
             assert!((1..=4).contains(&red), "node {node}: {red} red pixels");
         }
@@ -327,7 +393,7 @@ mod tests {
     #[test]
     fn colours_tell_the_sides_and_the_limit_apart() {
         let scale = SoftScale { low: -0.1, high: 1.0, soft: 0.005 };
-        let at = |d: f64| color_of(d, &scale, LIMITS);
+        let at = |d: f64| color_of(d, &scale, LIMITS, &LEFTOVER);
         let [within, beyond] = [at(-0.0099), at(-0.0102)];
         assert!(within[1] > 180 && beyond[1] < 90, "{within:?} {beyond:?}");
         assert!(at(0.5)[2] > at(0.5)[0] + 40);
@@ -337,17 +403,40 @@ mod tests {
     }
 
     #[test]
+    fn wood_out_of_reach_has_a_colour_and_a_figure_of_its_own() {
+        let grid = Grid { nx: 100, ny: 100, pitch_mm: 0.1, origin: DVec2::ZERO };
+        let plane = Plane::of(&Heightfield::flat(grid, 0.0));
+        let shade = vec![1.0; plane.v.len()];
+        let scale = SoftScale { low: -0.5, high: 1.0, soft: 0.005 };
+        let d = vec![0.3_f32; grid.len()];
+        // The left half cannot be reached.
+        let out: Vec<bool> = (0..grid.len()).map(|k| k % 100 < 50).collect();
+        let marks = Marks { deviation: &d, unreachable: Some(&out) };
+        let image = colored(marks, &grid, &plane, &shade, &scale, LIMITS);
+        let [left, right] = [image.rgb[450 * 900 + 100], image.rgb[450 * 900 + 800]];
+        assert!(left[0] > left[2] + 60, "ochre: {left:?}");
+        assert!(right[2] > right[0] + 60, "blue: {right:?}");
+        let mut d = d;
+        d[77] = 0.05;
+        d[33] = 0.9;
+        let d: Vec<f32> =
+            d.iter().enumerate().map(|(k, v)| if k % 100 < 50 { *v } else { v * 0.1 }).collect();
+        let (most, part) = Figures::of(&d, Some(&out)).reached.unwrap();
+        assert!((most - 0.03).abs() < 1e-6 && part == 0.5, "{most} {part}");
+    }
+
+    #[test]
     fn wrong_input_is_refused() {
         let grid = Grid { nx: 4, ny: 4, pitch_mm: 0.1, origin: DVec2::ZERO };
         let field = Heightfield::flat(grid, 0.0);
-        let short = deviation_png(&[0.0; 15], &field, LIMITS, "");
+        let short = deviation_png(&[0.0; 15], None, &field, LIMITS, "");
         assert!(matches!(short, Err(ReportError::Mismatch { got: 15, want: 16 })));
         for bad in [0.0, -1.0, f64::NAN, f64::INFINITY] {
             let limits = DeviationScale { gouge_mm: bad, ..LIMITS };
-            let got = deviation_png(&[0.0; 16], &field, limits, "");
+            let got = deviation_png(&[0.0; 16], None, &field, limits, "");
             assert!(matches!(got, Err(ReportError::BadNumber { .. })));
         }
-        assert!(deviation_png(&[f32::NAN; 16], &field, LIMITS, "nothing known").is_ok());
-        assert!(deviation_png(&[f32::INFINITY; 16], &field, LIMITS, "endless").is_ok());
+        assert!(deviation_png(&[f32::NAN; 16], None, &field, LIMITS, "nothing known").is_ok());
+        assert!(deviation_png(&[f32::INFINITY; 16], None, &field, LIMITS, "endless").is_ok());
     }
 }

@@ -67,6 +67,10 @@ fn shape(c: char) -> (f32, &'static str) {
         '°' => (4.4, "M 2.2 14 h 0 11.8 v 2.2 9.6 h 4.4 11.8 v 2.2 14"),
         '·' => (0.0, "M 0 5.3 L 0 5.5"),
         '±' => (8.4, "M 4.2 11 L 4.2 3.4 M 0 7.2 L 8.4 7.2 M 0 0.6 L 8.4 0.6"),
+        '³' => (
+            4.2,
+            "M 0.2 12.8 C 0.5 13.6 1.1 14 2 14 h 3.9 12.4 v 2 10.7 L 1.5 10.7 M 2 10.7 h 4.2 8.9 v 2 7 C 1 7 0.3 7.5 0 8.4",
+        ),
         'ß' => (7.6, "M 0 0 L 0 10.4 v 3.6 14 h 6.8 11 v 3.4 7.8 h 7.6 4 v 3 0"),
         'ı' => (0.0, "M 0 9.6 L 0 0"),
         _ => glyph(c).unwrap_or(UNKNOWN),
@@ -158,13 +162,13 @@ mod tests {
             assert!(glyph(c).is_some(), "{c:?}");
             assert!(c == ' ' || path(&c.to_string(), 0.0, 20.0, 14.0).is_some(), "{c:?}");
         }
-        assert!(covers("Größe 12 × 3 mm ±0.5° · Crème brûlée, señor Çelik"));
+        assert!(covers("Größe 12 × 3 mm ±0.5° · 3 cm³ Crème brûlée, señor Çelik"));
         assert!(!covers("彫"));
     }
 
     #[test]
     fn the_pen_stays_in_its_box_and_speaks_its_language() {
-        let others = "×°·±ß";
+        let others = "×°·±³ß";
         for c in (' '..='~').chain(others.chars()) {
             let (width, pen) = shape(c);
             let mut words = pen.split_ascii_whitespace().peekable();

@@ -1,7 +1,7 @@
 //! The relief as the eye would see it: plaster or wood, lit from the upper left.
 
 use super::ReportError;
-use super::canvas::{Align, Canvas, FAINT_INK, Image, Lettering};
+use super::canvas::{Align, Canvas, FAINT_INK, Image, Lettering, Rgb};
 use super::data::short;
 use super::depth::finite_range;
 use super::grain::Grain;
@@ -113,6 +113,23 @@ pub(super) fn shaded_image(
     let plane = Plane::sized(field, size_px);
     let light = lighting(&plane, exaggeration(&plane, 0.0, highest));
     Ok(colored(&plane, &light, look))
+}
+
+/// A faint relief in one colour, brought to a size in pixels: ground for lines that are drawn over it.
+pub(super) fn pale_image(
+    field: &Heightfield,
+    paper: Rgb,
+    size_px: (usize, usize),
+) -> Result<Image, ReportError> {
+    let (low, high) = finite_range(field, "shaded picture")?;
+    let plane = Plane::sized(field, size_px);
+    let light = lighting(&plane, exaggeration(&plane, low, high));
+    let shade = |(sun, sky): (&f32, &f32)| {
+        let light = (0.72 + 0.28 * 0.5 * (sun + sky)).clamp(0.6, 1.04);
+        paper.map(|c| (f32::from(c) * light + 0.5).min(255.0) as u8)
+    };
+    let rgb = light.sun.par_iter().zip(&light.sky).map(shade).collect();
+    Ok(Image { w: plane.w, h: plane.h, rgb })
 }
 
 /// By how much heights are multiplied for the light.
@@ -251,7 +268,7 @@ impl SrgbTable {
 mod tests {
     use super::*;
     use crate::geom::{DVec2, Grid};
-    use crate::report::{DeviationScale, depth_png, deviation_png, paths_png};
+    use crate::report::{Board, ColorBy, DeviationScale, depth_png, deviation_png, obj, paths_png};
     use std::io::Cursor;
 
     fn dome(nx: usize, ny: usize) -> Heightfield {
@@ -323,6 +340,7 @@ mod tests {
         let field = dome(150, 130);
         let deviation: Vec<f32> =
             (0..field.z().len()).map(|k| (k % 97) as f32 * 1e-3 - 0.02).collect();
+        let unreachable: Vec<bool> = (0..deviation.len()).map(|k| k % 5 == 0).collect();
         let at =
             |k: usize| DVec3::new((k * 7 % 90) as f64, (k * 13 % 50) as f64, -((k % 9) as f64));
         let moves: Vec<Move> = (0..500)
@@ -338,12 +356,16 @@ mod tests {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             pool.install(|| {
                 let limits = DeviationScale { gouge_mm: 0.01, scallop_mm: 0.01 };
-                let stock = crate::report::paths::tests::stock();
+                let board = crate::report::paths::tests::board();
+                let board = Board { top: Some(&field), ..board };
+                let paths = [("a", moves.as_slice()), ("b", &moves[..99])];
                 [
                     shaded_png(&field, Look::of_wood("beech", 0.2), Some("Dome")).unwrap(),
                     depth_png(&field).unwrap(),
-                    deviation_png(&deviation, &field, limits, "Deviation").unwrap(),
-                    paths_png(&[("a", &moves), ("b", &moves[..99])], &stock, "Paths").unwrap(),
+                    deviation_png(&deviation, Some(&unreachable), &field, limits, "Deviation")
+                        .unwrap(),
+                    paths_png(&paths, board, ColorBy::Feed, "Paths").unwrap(),
+                    obj(&field, -9.0, 1).unwrap(),
                     crate::report::stl(&field, -9.0, 1).unwrap(),
                 ]
             })

@@ -1,41 +1,20 @@
 //! The relief as a closed solid: binary STL.
-//!
-//! ```text
-//!      top: two triangles a cell, split from lower left to upper right
-//!     /\/\__/\
-//!    |        |   sides: two triangles along every edge of the rim
-//!    |________|   base: one fan from its middle to the rim, so that every rim vertex is shared
-//! ```
 
 use super::ReportError;
-use super::depth::finite_range;
-use crate::geom::{Grid, Heightfield};
+use super::solid::{Solid, Vertex};
+use crate::geom::Heightfield;
 use rayon::prelude::*;
 
 /// Bytes of a facet.
 const FACET: usize = 50;
 /// Bytes before the first facet.
 const HEADER: usize = 84;
-/// Most triangles of a mesh by default: 60 MB.
-const MOST_TRIANGLES: usize = 1_200_000;
-
-/// A vertex as it is stored.
-type Vertex = [f32; 3];
-
-/// The smallest `every_nth_node` for [`stl`] that keeps the file below 60 MB.
-pub fn stl_every_nth_node(grid: &Grid) -> usize {
-    let small_enough = |n: &usize| {
-        let cells = |nodes: usize| nodes.saturating_sub(1).div_ceil(*n);
-        triangles(cells(grid.nx), cells(grid.ny)).is_some_and(|t| t <= MOST_TRIANGLES)
-    };
-    (1..=grid.nx.max(grid.ny)).find(small_enough).unwrap_or(1)
-}
 
 /// The solid between the relief and a level base as a binary STL file, mm, closed, normals outwards.
 ///
 /// Only `every_nth_node` of the grid becomes a vertex (1 = all), the last row and column always;
-/// [`stl_every_nth_node`] finds the number that keeps the file below 60 MB. The top is triangulated
-/// as the heightfield itself is.
+/// [`mesh_every_nth_node`](super::mesh_every_nth_node) finds the number that keeps the file below 60 MB. The top is
+/// triangulated as the heightfield itself is.
 ///
 /// # Errors
 /// [`ReportError::NotFinite`] for heights that are not numbers, [`ReportError::BaseTooHigh`] when the
@@ -46,93 +25,31 @@ pub fn stl(
     base_z_mm: f64,
     every_nth_node: usize,
 ) -> Result<Vec<u8>, ReportError> {
-    let (lowest, _) = finite_range(field, "mesh")?;
-    if every_nth_node == 0 {
-        return Err(ReportError::BadNumber { what: "every_nth_node", value: 0.0 });
-    }
-    let base = base_z_mm as f32;
-    if !(base.is_finite() && base < lowest) {
-        return Err(ReportError::BaseTooHigh { base_z_mm, lowest_mm: f64::from(lowest) });
-    }
-    let solid = Solid {
-        field,
-        base,
-        columns: kept(field.grid().nx, every_nth_node),
-        rows: kept(field.grid().ny, every_nth_node),
-    };
-    solid.bytes()
-}
-
-/// Indices of the nodes that become vertices along one axis.
-fn kept(nodes: usize, step: usize) -> Vec<usize> {
-    let last = nodes - 1;
-    (0..last).step_by(step).chain([last]).collect()
-}
-
-/// Triangles of a solid of so many cells: top, sides and base.
-fn triangles(nx: usize, ny: usize) -> Option<usize> {
-    let top = nx.checked_mul(ny)?.checked_mul(2)?;
-    nx.checked_add(ny)?.checked_mul(6)?.checked_add(top)
-}
-
-struct Solid<'a> {
-    field: &'a Heightfield,
-    base: f32,
-    columns: Vec<usize>,
-    rows: Vec<usize>,
-}
-
-impl Solid<'_> {
-    fn bytes(&self) -> Result<Vec<u8>, ReportError> {
-        let (nx, ny) = (self.columns.len() - 1, self.rows.len() - 1);
-        let too_big = ReportError::TooBig { what: "a mesh", width: nx, height: ny };
-        let count = triangles(nx, ny).and_then(|n| u32::try_from(n).ok()).ok_or(too_big)?;
-        let mut bytes = vec![0_u8; HEADER + FACET * count as usize];
-        let title = b"relief made by relievo, binary STL, lengths in mm";
-        bytes[..title.len()].copy_from_slice(title);
-        bytes[80..HEADER].copy_from_slice(&count.to_le_bytes());
-        let (top, rest) = bytes[HEADER..].split_at_mut(FACET * 2 * nx * ny);
-        top.par_chunks_mut(FACET * 2 * nx).enumerate().for_each(|(j, row)| {
-            for (i, cell) in row.chunks_exact_mut(2 * FACET).enumerate() {
-                let [a, b] = [self.top(i, j), self.top(i + 1, j)];
-                let [c, d] = [self.top(i, j + 1), self.top(i + 1, j + 1)];
-                write_facet(&mut cell[..FACET], [a, b, d]);
-                write_facet(&mut cell[FACET..], [a, d, c]);
-            }
-        });
-        let rim = self.rim();
-        let middle = self.middle_of_base();
-        for (k, facets) in rest.chunks_exact_mut(3 * FACET).enumerate() {
-            let (a, b) = (rim[k], rim[(k + 1) % rim.len()]);
-            let (below_a, below_b) = ([a[0], a[1], self.base], [b[0], b[1], self.base]);
-            write_facet(&mut facets[..FACET], [a, below_a, below_b]);
-            write_facet(&mut facets[FACET..2 * FACET], [a, below_b, b]);
-            write_facet(&mut facets[2 * FACET..], [middle, below_b, below_a]);
+    let solid = Solid::of(field, base_z_mm, every_nth_node)?;
+    let (nx, ny) = solid.cells();
+    let mut bytes = vec![0_u8; HEADER + FACET * solid.triangles as usize];
+    let title = b"relief made by relievo, binary STL, lengths in mm";
+    bytes[..title.len()].copy_from_slice(title);
+    bytes[80..HEADER].copy_from_slice(&solid.triangles.to_le_bytes());
+    let (top, rest) = bytes[HEADER..].split_at_mut(FACET * 2 * nx * ny);
+    top.par_chunks_mut(FACET * 2 * nx).enumerate().for_each(|(j, row)| {
+        for (i, cell) in row.chunks_exact_mut(2 * FACET).enumerate() {
+            let [a, b] = [solid.top(i, j), solid.top(i + 1, j)];
+            let [c, d] = [solid.top(i, j + 1), solid.top(i + 1, j + 1)];
+            write_facet(&mut cell[..FACET], [a, b, d]);
+            write_facet(&mut cell[FACET..], [a, d, c]);
         }
-        Ok(bytes)
+    });
+    let rim = solid.rim();
+    let middle = solid.middle_of_base();
+    for (k, facets) in rest.chunks_exact_mut(3 * FACET).enumerate() {
+        let [a, b] = [rim[k], rim[(k + 1) % rim.len()]].map(|(i, j)| solid.top(i, j));
+        let (below_a, below_b) = ([a[0], a[1], solid.base], [b[0], b[1], solid.base]);
+        write_facet(&mut facets[..FACET], [a, below_a, below_b]);
+        write_facet(&mut facets[FACET..2 * FACET], [a, below_b, b]);
+        write_facet(&mut facets[2 * FACET..], [middle, below_b, below_a]);
     }
-
-    /// The vertex at kept column `i` and kept row `j`.
-    fn top(&self, i: usize, j: usize) -> Vertex {
-        let (i, j) = (self.columns[i], self.rows[j]);
-        let p = self.field.grid().node(i, j);
-        [p.x as f32, p.y as f32, self.field.at(i, j)]
-    }
-
-    /// The rim of the top, counter-clockwise seen from above, first vertex not repeated.
-    fn rim(&self) -> Vec<Vertex> {
-        let (nx, ny) = (self.columns.len() - 1, self.rows.len() - 1);
-        let front = (0..nx).map(|i| (i, 0));
-        let right = (0..ny).map(|j| (nx, j));
-        let back = (1..=nx).rev().map(|i| (i, ny));
-        let left = (1..=ny).rev().map(|j| (0, j));
-        front.chain(right).chain(back).chain(left).map(|(i, j)| self.top(i, j)).collect()
-    }
-
-    fn middle_of_base(&self) -> Vertex {
-        let middle = self.field.grid().bounds().center();
-        [middle.x as f32, middle.y as f32, self.base]
-    }
+    Ok(bytes)
 }
 
 /// Writes one 50-byte facet: unit normal, three corners counter-clockwise from outside, two zero bytes.
@@ -151,7 +68,9 @@ fn write_facet(out: &mut [u8], [a, b, c]: [Vertex; 3]) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geom::{DVec2, DVec3};
+    use crate::geom::{DVec2, DVec3, Grid};
+    use crate::report::mesh_every_nth_node;
+    use crate::report::solid::triangles;
     use proptest::prelude::*;
     use std::collections::HashMap;
     use std::io::Cursor;
@@ -227,7 +146,18 @@ mod tests {
         ) {
             let grid = Grid { nx, ny, pitch_mm: 0.25, origin: DVec2::new(1.0, -2.0) };
             let field = Heightfield::from_z(grid, heights[..nx * ny].to_vec());
-            prop_assert!(closed_volume(&stl(&field, -6.0, step).unwrap()) > 0.0);
+            let volume = closed_volume(&stl(&field, -6.0, step).unwrap());
+            prop_assert!(volume > 0.0);
+            if step == 1 {
+                // Each triangle of a cell stands over half its area, as high as its corners on average.
+                let over = |i: usize, j: usize| f64::from(field.at(i, j)) + 6.0;
+                let cell = |i: usize, j: usize| {
+                    2.0 * over(i, j) + over(i + 1, j) + over(i, j + 1) + 2.0 * over(i + 1, j + 1)
+                };
+                let cells = (0..ny - 1).flat_map(|j| (0..nx - 1).map(move |i| (i, j)));
+                let want = cells.map(|(i, j)| cell(i, j) * 0.25 * 0.25 / 6.0).sum::<f64>();
+                prop_assert!((volume - want).abs() < 1e-5 * want, "{volume} {want}");
+            }
         }
     }
 
@@ -235,7 +165,7 @@ mod tests {
     fn the_default_step_keeps_files_small() {
         let grid = |n: usize| Grid { nx: n, ny: n, pitch_mm: 0.1, origin: DVec2::ZERO };
         for (n, want) in [(2, 1), (700, 1), (1600, 3), (4001, 6)] {
-            let step = stl_every_nth_node(&grid(n));
+            let step = mesh_every_nth_node(&grid(n));
             assert_eq!(step, want, "{n} nodes");
             let cells = (n - 1).div_ceil(step);
             assert!(HEADER + FACET * triangles(cells, cells).unwrap() < 60_001_000);

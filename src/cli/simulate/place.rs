@@ -3,11 +3,14 @@
 use super::Args;
 use super::header::Header;
 use crate::cli::{Stop, files, inputs, outcome};
-use crate::gcode::read::{self, Program};
+use crate::cutter::Profile;
+use crate::gcode::read::{self, Frame, Program, Start};
 use crate::geom::{Bounds, DVec2, DVec3, Grid, Heightfield, Tolerance};
+use crate::heights::{self, Given};
 use crate::job::{CutterSpec, Job, Library, Machine, Operation, Origin, Stock, Wood};
 use crate::proof::{Manners, Part, Setup};
 use crate::relief::Grounds;
+use crate::report::Cut;
 use crate::{design, offset};
 use anyhow::{Context, Result, anyhow, bail};
 use std::path::Path;
@@ -22,6 +25,8 @@ pub(super) struct Ready {
     pub(super) target: Option<Heightfield>,
     /// The lowest surface that the cutters can leave of the target.
     pub(super) reach: Option<Heightfield>,
+    /// Cross-sections that were asked for.
+    pub(super) cuts: Vec<Cut>,
     /// Cutters of the library with a finer end than those of the programs.
     pub(super) smaller: Vec<CutterSpec>,
     /// What was taken to be so.
@@ -31,12 +36,15 @@ pub(super) struct Ready {
 /// A program's text with its name and what its header says.
 struct Source {
     name: String,
-    text: String,
+    bytes: Vec<u8>,
     header: Header,
 }
 
 /// Without a job: height of the tip before the first move above the stock's top, mm.
 const START_MM: f64 = 50.0;
+
+/// Without a job: the tip touches nothing at this height above the stock's top, mm.
+const CLEAR_MM: f64 = 5.0;
 
 /// Stock that nobody gives is this much larger than what the programs cut, mm.
 const MARGIN_MM: f64 = 5.0;
@@ -83,8 +91,9 @@ pub(super) fn prepare(args: &Args, enter: &mut dyn FnMut(&str)) -> Result<Ready,
     let manners = manners(&sources);
     let known: Vec<&CutterSpec> = job.operations.iter().map(|o| &o.cutter).collect();
     let start = DVec3::new(0.0, 0.0, job.safe_z_mm);
+    let frame = frame(args, start, job.safe_z_mm);
     let cutters = Cutters { args, library: &input.library, job: &known };
-    let parts = parts(&sources, &job.machine, start, &cutters)?;
+    let parts = parts(&sources, &job.machine, frame, &cutters, &mut notes)?;
     enter("reach");
     let target = design.relief.target;
     let reach = offset::reach(&job, &Grounds::new(&job, &design.outlines, &target));
@@ -96,6 +105,7 @@ pub(super) fn prepare(args: &Args, enter: &mut dyn FnMut(&str)) -> Result<Ready,
         grid: *target.grid(),
         target: Some(target),
         reach: Some(reach),
+        cuts: cuts(args),
         smaller: smaller(&input.library, &parts),
         setup,
         parts,
@@ -104,10 +114,10 @@ pub(super) fn prepare(args: &Args, enter: &mut dyn FnMut(&str)) -> Result<Ready,
 }
 
 fn source(path: &Path) -> Result<Source> {
-    let text = files::read_text(path)?;
+    let bytes = files::read(path)?;
     let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    let header = Header::of(&text);
-    Ok(Source { name, text, header })
+    let header = Header::of(&String::from_utf8_lossy(&bytes));
+    Ok(Source { name, bytes, header })
 }
 
 /// Our rules hold where relievo wrote all programs.
@@ -152,8 +162,8 @@ fn without_job(
         }
     };
     let cutters = Cutters { args, library, job: &[] };
-    let start = DVec3::new(0.0, 0.0, START_MM);
-    let parts = parts(sources, &machine, start, &cutters)?;
+    let frame = frame(args, DVec3::new(0.0, 0.0, START_MM), CLEAR_MM);
+    let parts = parts(sources, &machine, frame, &cutters, &mut notes)?;
     let (size, origin) = match (args.stock.or(header.stock_mm), args.origin.or(header.origin)) {
         (Some(size), origin) => (size, origin.unwrap_or(Origin::LowerLeft)),
         (None, Some(_)) => bail!("--origin needs the size of the stock; give --stock as 120x80x18"),
@@ -197,8 +207,13 @@ fn without_job(
     }
     add_operations(&mut setup, &parts);
     let title = header.title.clone().unwrap_or_else(|| sources[0].name.clone());
-    let smaller = Vec::new();
-    Ok(Ready { title, setup, parts, grid, target: None, reach: None, smaller, notes })
+    let target =
+        args.target.as_ref().map(|path| target(args, path, &setup.stock, &grid, &mut notes));
+    let target = target.transpose()?;
+    let profiles: Vec<Profile> = parts.iter().map(|p| Profile::of(&p.cutter)).collect();
+    let reach = target.as_ref().map(|target| offset::reach_of(target, &profiles));
+    let (cuts, smaller) = (cuts(args), smaller(library, &parts));
+    Ok(Ready { title, setup, parts, grid, target, reach, cuts, smaller, notes })
 }
 
 const DEFAULT_MACHINE: &str = "shapeoko3";
@@ -291,23 +306,80 @@ impl Cutters<'_> {
     }
 }
 
+/// What the coordinates of the programs mean.
+fn frame(args: &Args, start: DVec3, clear_z_mm: f64) -> Frame {
+    let mut frame = Frame { clear_z_mm, ..Frame::new(start) };
+    for &(k, zero) in &args.offsets {
+        frame.offsets_mm[k] = Some(zero);
+    }
+    // The zero in machine coordinates, seen from itself, is machine zero the other way round.
+    frame.machine_zero_mm = args.zero.map(|zero| -zero);
+    frame
+}
+
 /// Reads the programs; each part of one cutter by itself.
 fn parts(
     sources: &[Source],
     machine: &Machine,
-    start: DVec3,
+    mut frame: Frame,
     cutters: &Cutters,
+    notes: &mut Vec<String>,
 ) -> Result<Vec<Part>> {
-    let mut parts = Vec::new();
+    let (mut parts, mut zero) = (Vec::new(), None);
     for (k, source) in sources.iter().enumerate() {
-        let program = read(source, machine, start)?;
-        parts.push(Part::whole(&source.name, &cutters.find(k, source, None)?, program));
+        let program = read(source, machine, &frame)?;
+        if let Some(number) = program.assumed_zero {
+            let (first, name) = zero.get_or_insert((number, &source.name));
+            if *first != number {
+                bail!(
+                    "{} works in G{number} and {name} in G{first}: give the zeros of both, as --offset G{number}=120,0,0",
+                    source.name
+                );
+            }
+        }
+        if let Some(end) = program.end {
+            frame.start = Start::Known(end);
+        }
+        notes.extend(program.notes.iter().map(|note| format!("{}: {note}", source.name)));
+        parts.extend(Part::split(&source.name, program, |tool| cutters.find(k, source, tool))?);
     }
     Ok(parts)
 }
 
-fn read(source: &Source, machine: &Machine, start: DVec3) -> Result<Program> {
-    read::read(&source.text, machine, start).map_err(|e| anyhow!("{}, {e}", source.name))
+/// Our own programs are read as strictly as when they were proved.
+fn read(source: &Source, machine: &Machine, frame: &Frame) -> Result<Program> {
+    let (Start::Known(start) | Start::Assumed(start)) = frame.start;
+    let text = std::str::from_utf8(&source.bytes).ok().filter(|_| source.header.is_ours);
+    let program = match text {
+        Some(text) => read::read(text, machine, start),
+        None => read::read_any(&source.bytes, machine, frame),
+    };
+    program.map_err(|e| anyhow!("{}, {e}", source.name))
+}
+
+/// The target of a file.
+fn target(
+    args: &Args,
+    path: &Path,
+    stock: &Stock,
+    grid: &Grid,
+    notes: &mut Vec<String>,
+) -> Result<Heightfield> {
+    let given = args.target_z.map(|z| Given {
+        z_black_mm: z.x,
+        z_white_mm: z.y,
+        width_mm: args.target_width.unwrap_or(stock.width_mm),
+        origin: stock.bounds().min,
+    });
+    let read = heights::read(&files::read(path)?, given, grid, 0.0)
+        .with_context(|| path.display().to_string())?;
+    notes.extend(read.notes);
+    Ok(read.field)
+}
+
+fn cuts(args: &Args) -> Vec<Cut> {
+    let cut = |&[a, b, c, d]: &[f64; 4]| Cut { from: DVec2::new(a, b), to: DVec2::new(c, d) };
+    args.sections.iter().map(cut).collect()
 }
 
 /// Every cutter that no operation of the job uses gets one with the speeds of the tables.

@@ -67,7 +67,7 @@ pub(super) fn text(done: &Simulated, written: Option<&str>) -> String {
 fn part(r: &ProgramReport) -> String {
     let t = &r.times;
     let mut out = format!(
-        "{} with {}: {} lines, {:.1} m cut, lowest Z {:.3}\n  {}: cutting {}, in air {}, rapids {}, waiting {}; \
+        "{} with {}: {} lines, {:.2} m cut, lowest Z {:.3}\n  {}: cutting {}, in air {}, rapids {}, waiting {}; \
          of the feed moves {} go steeply down\n",
         r.name,
         r.cutter,

@@ -74,7 +74,7 @@ pub enum Fault {
     /// The tip is somewhere that the program does not say.
     #[error(
         "where the tip stands is not known since line {since}, which goes by machine coordinates: go on with absolute \
-         coordinates (G90), X and Y with both ends of the way above everything, or give --machine-zero X,Y,Z"
+         coordinates (G90), X and Y with both ends of the way above everything, or give --zero X,Y,Z"
     )]
     Lost {
         /// The line that led there.

@@ -202,12 +202,12 @@ impl Cell<'_> {
         let along_y = |z: &[f32]| -> Vec<(f32, f32)> {
             stretched(z, h).map(|(s, z)| (side + rise * z, y + h - s)).collect()
         };
-        for (px, py) in along_x(&row) {
-            self.canvas.rect([px.floor(), py, 1.0, foot - py], FILL, 1.0);
-        }
-        for (px, py) in along_y(&column) {
-            self.canvas.rect([side, py.floor(), px - side, 1.0], FILL, 1.0);
-        }
+        let mut under = along_x(&row);
+        under.extend([(x + w, foot), (x, foot)]);
+        self.canvas.fill(&under, FILL, 1.0);
+        let mut beside = along_y(&column);
+        beside.extend([(side, y), (side, y + h)]);
+        self.canvas.fill(&beside, FILL, 1.0);
         self.canvas.line(&[(x, foot), (x + w, foot)], 1.0, PAPER_LINE, None);
         self.canvas.line(&[(side, y), (side, y + h)], 1.0, PAPER_LINE, None);
         if let Some(first) = shown.compared.first().filter(|f| f.method != compared.method) {

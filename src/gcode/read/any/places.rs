@@ -215,7 +215,7 @@ impl Foreign<'_> {
             (true, _) => DVec3::ZERO,
             (false, Some(machine_zero_mm)) => machine_zero_mm,
             (false, None) => {
-                let why = "sets a zero in machine coordinates, whose place is not known; give --machine-zero X,Y,Z";
+                let why = "sets a zero in machine coordinates, whose place is not known; give --zero X,Y,Z";
                 return Err(self.refused_once(why));
             }
         };
@@ -313,8 +313,7 @@ impl Foreign<'_> {
         }
         let low = axes[2].is_some_and(|v| v * self.core.mm_per_unit < -NEAR_TOP_MM);
         if self.core.motion != Motion::Rapid || low {
-            let why =
-                "moves by machine coordinates, whose place is not known; give --machine-zero X,Y,Z";
+            let why = "moves by machine coordinates, whose place is not known; give --zero X,Y,Z";
             return Err(self.refused_once(why));
         }
         self.leave(moving, None)
@@ -335,7 +334,7 @@ impl Foreign<'_> {
         }
         if (moving[0] || moving[1]) && self.core.at.z < self.clear_z_mm {
             let why = "goes in X or Y to a place in machine coordinates that is not known, too low to touch nothing; rise first, \
-                 or give --machine-zero X,Y,Z";
+                 or give --zero X,Y,Z";
             return Err(self.refused_once(why));
         }
         if moving[2] {
@@ -350,7 +349,7 @@ impl Foreign<'_> {
         }
         self.lost_since = self.core.number;
         let text = "where machine zero lies is not known: Z goes straight up, X and Y away above everything; \
-             --machine-zero X,Y,Z would have these ways checked";
+             --zero X,Y,Z would have these ways checked";
         self.note(Topic::Home, text);
         Ok(())
     }

@@ -418,7 +418,7 @@ fn g10_and_g92_set_zeros() {
     let p = read_in(&homed(), "G21 G10 L2 P2 X-290 Y-180 Z-70\nG55 G0 X1 Y2 Z3\n").unwrap();
     assert_eq!(last(&p), at(11.0, 22.0, 13.0));
     let e = fault("G10 L2 P1 X0 Y0 Z0\n");
-    assert!(e.to_string().contains("--machine-zero"), "{e}");
+    assert!(e.to_string().contains("--zero"), "{e}");
     // Before any motion nobody but the line knows where the tip stands: the operator has put it there.
     let p = ok("G21\nG92 X0 Y0 Z0\nG0 Z5\nG0 X3\n");
     assert_eq!(ends(&p), [at(0.0, 0.0, 5.0), at(3.0, 0.0, 5.0)]);
@@ -474,7 +474,7 @@ fn without_machine_zero_only_ways_that_cannot_matter_pass() {
     // Never: aside while low, down, or with a feed.
     for text in ["G53 X0", "G28", "G91 G28 X0", "G53 Z-50", "G53 G1 Z0 F100", "G90 G28 X0 Z0"] {
         let e = read(text).unwrap_err();
-        assert!(e.to_string().contains("--machine-zero"), "{text}: {e}");
+        assert!(e.to_string().contains("--zero"), "{text}: {e}");
     }
 }
 
