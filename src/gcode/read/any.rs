@@ -150,6 +150,7 @@ enum Topic {
     Relative,
     Told,
     Home,
+    Stored,
     Rest,
 }
 

@@ -285,6 +285,11 @@ impl Foreign<'_> {
         } else {
             moving = [true; 3];
         }
+        if self.offsets.stored_mm[which].is_none() && self.offsets.machine_zero_mm.is_some() {
+            let text =
+                "the places of G28 and G30 are stored in the controller; taken as machine zero";
+            self.note(Topic::Stored, text);
+        }
         self.leave(moving, self.offsets.stored_mm[which].or(self.offsets.machine_zero_mm))
     }
 

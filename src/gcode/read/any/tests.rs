@@ -444,6 +444,9 @@ fn machine_coordinates_lead_where_machine_zero_is_told_to_be() {
     let stored = Frame { stored_mm: [None, Some(at(5.0, 6.0, 70.0))], ..homed() };
     let p = read_in(&stored, &format!("{head}G91 G30 Z0\nG30 X0 Y0\n")).unwrap();
     assert_eq!(ends(&p)[1..], [at(10.0, 20.0, 70.0), at(5.0, 6.0, 70.0)]);
+    assert!(p.notes.is_empty(), "{:?}", p.notes);
+    let p = read_in(&homed(), &format!("{head}G30\n")).unwrap();
+    assert!(p.notes[0].contains("stored in the controller"), "{:?}", p.notes);
 }
 
 #[test]
