@@ -276,7 +276,8 @@ impl Layout {
         };
         let px_per_mm = longest / view.size().max_element();
         let panel = (view.size() * px_per_mm).round().max(DVec2::ONE);
-        let unit = (longest * columns as f64 / 2300.0).clamp(0.85, 1.15) as f32;
+        // Letters stay readable when the page fills A4.
+        let unit = (longest * columns as f64 / 1750.0).clamp(0.85, 1.7) as f32;
         Self {
             view,
             px_per_mm,
