@@ -323,6 +323,9 @@ fn notes(site: &Site, out: &Emitter) -> Vec<String> {
             "{who}: nothing to cut: the cutter fits nowhere or no wood is in its way"
         ));
     }
+    if let (Some(way), false) = (out.chosen(), moves.is_empty()) {
+        notes.push(format!("{who}: {way}"));
+    }
     if out.skipped() > 0 {
         let n = out.skipped();
         notes.push(format!(

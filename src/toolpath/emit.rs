@@ -36,6 +36,8 @@ pub(super) struct Emitter<'a> {
     skipped: usize,
     /// Depth of a pass that is deeper than one should be, mm; else 0.
     deepest_pass_mm: f64,
+    /// Which of two ways was the quicker one, where that was left open.
+    chosen: Option<&'static str>,
 }
 
 impl<'a> Emitter<'a> {
@@ -48,7 +50,17 @@ impl<'a> Emitter<'a> {
         let profile = Profile::of(&operation.cutter).inflated(leave_mm).rolled(LEAST_ROUNDING_MM);
         let slim = Dropper::new(target, profile.slimmed(DROP_MM));
         let (moves, arcs) = (Vec::new(), Vec::new());
-        Self { job, operation, slim, leave_mm, moves, arcs, skipped: 0, deepest_pass_mm: 0.0 }
+        Self {
+            job,
+            operation,
+            slim,
+            leave_mm,
+            moves,
+            arcs,
+            skipped: 0,
+            deepest_pass_mm: 0.0,
+            chosen: None,
+        }
     }
 
     /// The moves so far: they start and end at safe Z.
@@ -64,6 +76,16 @@ impl<'a> Emitter<'a> {
     /// Number of chains left out.
     pub(super) fn skipped(&self) -> usize {
         self.skipped
+    }
+
+    /// Remembers which of two ways was the quicker one.
+    pub(super) fn choose(&mut self, way: &'static str) {
+        self.chosen = Some(way);
+    }
+
+    /// Which of two ways was the quicker one, where that was left open.
+    pub(super) fn chosen(&self) -> Option<&'static str> {
+        self.chosen
     }
 
     /// Depth of a pass that is deeper than one should be, mm; 0 when there is none.

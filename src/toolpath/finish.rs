@@ -69,6 +69,12 @@ pub(super) fn finish(
     outlines = outlines.filter(|distance| {
         !is_free || outlines_are_quicker(site, angle_rad, steeper_than_rad, &tip, distance)
     });
+    if is_free {
+        out.choose(match outlines {
+            Some(_) => "passes follow the outlines, which is quicker than straight rows",
+            None => "passes in straight rows, which is quicker than following the outlines",
+        });
+    }
     let mut site = *site;
     if !site.finished {
         let cut = Contour { scallop_mm, steeper_than_rad, milling: None };
