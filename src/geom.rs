@@ -13,6 +13,7 @@
 //! ```
 
 pub mod arc;
+pub mod biarc;
 pub mod curves;
 mod distance;
 pub(crate) mod edge_grid;
