@@ -69,7 +69,8 @@ pub enum Course {
 }
 
 /// What an interpolating scheme takes for the points beyond the ends of an open polygon.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum EndRule {
     /// The polygon reflected about its end point: no curvature there.
     Reflect,

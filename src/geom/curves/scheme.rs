@@ -12,7 +12,8 @@ use crate::geom::{DVec2, DVec3};
 pub const MOST_LEVELS: u32 = 10;
 
 /// A way to put a smooth curve through or near the points of a polygon in the plane.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum Scheme {
     /// Corner cutting: touches the middle of every edge, never overshoots.
     Chaikin,
@@ -50,7 +51,8 @@ pub enum Scheme {
 }
 
 /// What the points of the polygon are to a B-spline.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum Fit {
     /// Control points, which it passes at some distance.
     Control,

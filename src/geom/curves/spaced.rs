@@ -219,7 +219,8 @@ impl<V: Vector> SpacedCurve<V> {
 }
 
 /// How knot spacings are found from points.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum Spacing {
     /// All equal.
     Uniform,
