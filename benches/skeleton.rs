@@ -1,10 +1,11 @@
-//! What skeletons and ruled surfaces cost, stage by stage: `cargo bench --bench skeleton`.
+//! What smoothed outlines, skeletons and ruled surfaces cost, stage by stage: `cargo bench --bench skeleton`.
 //!
 //! A gear-shaped figure with more and more points shows how the cost grows. What a real figure takes is
 //! told by `relievo carve --timings`.
 
 #![allow(clippy::print_stdout, reason = "the table is what this command is for")]
 
+use relievo::geom::curves::{Course, EndRule, Fit, Scheme, Spacing, Stop, Strand};
 use relievo::geom::{DVec2, Grid, Ring};
 use relievo::job::{Profile, SkeletonSpec};
 use relievo::outline::Region;
@@ -23,6 +24,31 @@ fn main() {
     for points in [1_000, 3_000, 10_000, 30_000, 100_000] {
         row(points);
     }
+    println!("\n| outline scheme | million points made a second |");
+    println!("|---|---|");
+    for scheme in SCHEMES {
+        scheme_row(&scheme);
+    }
+}
+
+/// The schemes of `smooth_outline`.
+const SCHEMES: [Scheme; 7] = [
+    Scheme::Chaikin,
+    Scheme::CubicBspline { fit: Fit::Control },
+    Scheme::FourPoint { tension: 0.0625, ends: EndRule::Reflect },
+    Scheme::TwoNPoint { pairs: 3, ends: EndRule::Reflect },
+    Scheme::TwoNPoint { pairs: 4, ends: EndRule::Reflect },
+    Scheme::NonuniformBspline { fit: Fit::Control, spacing: Spacing::Centripetal },
+    Scheme::Incenter { update: 0.25 },
+];
+
+/// Six steps on an outline of 3000 points.
+fn scheme_row(scheme: &Scheme) {
+    let outer = figure(3_000).outer;
+    let strand =
+        Strand { points: &outer, course: Course::Closed, weights: &[], tangents: [None; 2] };
+    let (ms, fine) = best_ms(|| scheme.refine(&strand, Stop::Levels(6)));
+    println!("| {scheme:?} | {:.1} |", fine.len() as f64 / ms / 1e3);
 }
 
 /// A round figure with waves along its outline, 400 mm across.

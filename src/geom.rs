@@ -1,4 +1,4 @@
-//! Points, bounds, exact orientation, polygons, plain moves, tolerances and the heightfield itself.
+//! Points, bounds, exact orientation, polygons, subdivision curves, plain moves, tolerances and the heightfield itself.
 //!
 //! Everything is in millimetres: x right, y up, z up. Rings are lists of vertices without repetition
 //! of the first one; outer rings run counter-clockwise, holes clockwise, so that the figure lies to
@@ -13,6 +13,8 @@
 //! ```
 
 pub mod arc;
+pub mod biarc;
+pub mod curves;
 mod distance;
 pub(crate) mod edge_grid;
 mod heightfield;
@@ -20,7 +22,7 @@ mod moves;
 mod polygon;
 
 pub use distance::distance_field;
-pub use glam::{DVec2, DVec3};
+pub use glam::{DVec2, DVec3, DVec4};
 pub use heightfield::{Grid, GridError, Heightfield};
 pub use moves::{Move, MoveKind};
 pub use polygon::{

@@ -5,6 +5,7 @@
 
 mod types;
 mod surface;
+mod smooth;
 mod keys;
 mod error;
 mod colors;
@@ -26,6 +27,7 @@ pub use draft::Draft;
 pub use error::{Fault, JobError};
 pub use group::GroupSpec;
 pub use library::{BUILT_IN_FILES, Library};
+pub use smooth::{DrawnCurves, SmoothSpec};
 pub use surface::{
     Control, CrestSpec, Join, Profile, Prune, Scheme, Significance, SkeletonSpec, Split,
     SubdivisionSpec, SurfaceSpec,

@@ -8,7 +8,7 @@
 //!
 //! | module | takes -> gives | may use |
 //! |---|---|---|
-//! | `geom` | points, bounds, exact orientation, polygons, arcs, plain moves, `Heightfield` (the grid itself), `Tolerance` | - |
+//! | `geom` | points, bounds, exact orientation, polygons, curves by subdivision, arcs and biarcs, plain moves, `Heightfield` (the grid itself), `Tolerance` | - |
 //! | `job` | design TOML + machine, cutter and wood tables -> a checked `Job`; every default in one table | geom |
 //! | `cutter` | cutter shapes: height of the profile at a radius, tip, flank, shank, holder | geom job |
 //! | `artwork` | SVG or bitmap bytes -> curves by layer, closed or open, every one resolved or refused | geom job |

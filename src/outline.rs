@@ -1,8 +1,8 @@
-//! Curves -> [`Region`]s (outer ring + holes): flatten, resolve, orient, nest.
+//! Curves -> [`Region`]s (outer ring + holes): flatten or smooth, resolve, orient, nest.
 //!
 //! ```text
 //!   curve --flatten--> rings --its own fill rule--> resolved rings --part, clean, nest--> Regions
-//!           chord_mm            (artwork::boolean)                    (regions)
+//!      chord_mm, smooth_outline (artwork::boolean)                    (regions)
 //! ```
 //!
 //! Artwork from the wild crosses itself, touches itself and doubles back. Each shape is resolved by its own fill
@@ -13,6 +13,7 @@ mod check;
 mod melt;
 mod notes;
 mod regions;
+mod smooth;
 mod trace;
 
 pub use check::RegionFault;
@@ -108,6 +109,36 @@ pub enum OutlineError {
         chord_mm: f64,
         /// Most chords of one shape.
         limit: usize,
+    },
+    /// So many steps of smoothing that a shape gets more vertices than it may have.
+    #[error(
+        "{shape}: smooth_outline.levels = {levels} gives it more than {limit} vertices; lower it, or leave it out to have \
+         as many as chord_mm asks for"
+    )]
+    TooManyLevels {
+        /// The shape.
+        shape: String,
+        /// What was given.
+        levels: u32,
+        /// Most vertices of one shape.
+        limit: usize,
+    },
+    /// A place that should name a vertex, and none is near.
+    #[error(
+        "layer '{layer}': smooth_outline.{key} names a vertex at {place}, but the nearest one that was drawn lies at \
+         {nearest} mm, farther away than {reach_mm} mm; correct the place (work coordinates)"
+    )]
+    NoVertex {
+        /// Name of the layer.
+        layer: String,
+        /// The key.
+        key: &'static str,
+        /// The place, mm.
+        place: DVec2,
+        /// The vertex nearest to it, mm.
+        nearest: DVec2,
+        /// How far it may be, mm.
+        reach_mm: f64,
     },
     /// A path that crosses itself without end.
     #[error(

@@ -398,6 +398,7 @@ fn bevelled(shape: &Shape, grid: &Grid) -> Patch {
         draft_rad: 0.0,
         slope_cap: f64::INFINITY,
         union: false,
+        smooth: None,
         visible: false,
     };
     let figure = Figure { source: layer.name.clone(), regions: vec![shape.region.clone()] };

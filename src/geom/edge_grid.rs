@@ -144,6 +144,20 @@ impl EdgeGrid {
         count
     }
 
+    /// Where they do, in no order of meaning; at most `limit` places.
+    pub(crate) fn crossing_points(&self, limit: usize) -> Vec<DVec2> {
+        let mut found = Vec::new();
+        self.for_pairs(|cell, i, j| {
+            let (e, g) = (&self.edges[i], &self.edges[j]);
+            let at = crossing_point(e, g);
+            if crosses(e, g) && self.cell_of(at) == cell {
+                found.push(at);
+            }
+            found.len() < limit
+        });
+        found
+    }
+
     fn cell_of(&self, p: DVec2) -> usize {
         let q = ((p - self.origin) / self.cell).max(DVec2::ZERO);
         let ny = (self.starts.len() - 1) / self.nx;

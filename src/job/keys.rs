@@ -164,6 +164,24 @@ pub(super) const METHODS: &[&str] = &[
 ];
 /// Names of [`super::Control`], in its order.
 pub(super) const CONTROLS: &[&str] = &["even", "split", "quad4", "quad6"];
+/// Ways to smooth an outline.
+pub(super) const SMOOTHINGS: &[&str] = &[
+    "chaikin",
+    "cubic-bspline",
+    "four-point",
+    "six-point",
+    "2n-point",
+    "nonuniform-bspline",
+    "incenter",
+];
+/// Names of [`crate::geom::curves::EndRule`], in its order.
+pub(super) const END_RULES: &[&str] = &["reflect", "lagrange"];
+/// Names of [`crate::geom::curves::Fit`], in its order.
+pub(super) const FITS: &[&str] = &["control", "through"];
+/// Names of [`crate::geom::curves::Spacing`], in its order.
+pub(super) const SPACINGS: &[&str] = &["uniform", "chord", "centripetal"];
+/// Names of [`super::DrawnCurves`], in its order.
+pub(super) const CURVE_KINDS: &[&str] = &["keep", "points"];
 /// Names of [`super::Prune`], in its order.
 pub(super) const PRUNES: &[&str] = &["inscribed", "half-disc"];
 /// Names of [`super::Split`], in its order.
@@ -205,9 +223,9 @@ const fn key(name: &'static str, kind: Kind, default: Fallback, doc: &'static st
 use Fallback::{Flag, Number, Required, Rule, Text};
 
 /// The sections of a job, in the order in which they are written out.
-pub(super) static JOB: [&Section; 12] = [
+pub(super) static JOB: [&Section; 13] = [
     &TOP, &STOCK, &ARTWORK, &TRACE, &RELIEF, &TOLERANCE, &SAFETY, &KEEP_OUT, &LAYER, &SURFACE,
-    &GROUP, &OPERATION,
+    &SMOOTH, &GROUP, &OPERATION,
 ];
 
 /// Top level of a job.
@@ -599,6 +617,14 @@ pub(super) static LAYER: Section = Section {
             Number(4.0),
             "steepest flank (rise over run) of a narrow figure; \"none\" = no cap",
         ),
+        key(
+            "smooth_outline",
+            Kind::Forms(
+                "\"none\", \"incenter\", \"four-point\", another method or { method = \"four-point\", corner_deg = 40, ... }",
+            ),
+            Text("none"),
+            "how the outline's straight sides are rounded to a curve; corners stay",
+        ),
         key("union", Kind::Flag, Flag(false), "melt the layer's paths into one figure"),
         key(
             "visible",
@@ -646,6 +672,94 @@ pub(super) static SLOPE_CAP: Kind = Kind::Number { min: 0.05, max: 1000.0, unit:
 
 /// Range of the numbers in `artwork.at`.
 pub(super) static AT: Kind = mm(-LENGTH, LENGTH);
+
+/// Range of the weights in `layer.smooth_outline.weights`.
+pub(super) static WEIGHT: Kind = Kind::Number { min: 0.01, max: 100.0, unit: "" };
+
+/// The table form of `layer.smooth_outline`.
+pub(super) static SMOOTH: Section = Section {
+    name: "smooth_outline",
+    header: "smooth_outline = { ... }",
+    doc: "how outlines are smoothed (inside a [[layer]])",
+    keys: &[
+        key(
+            "method",
+            Kind::Forms(
+                "\"chaikin\", \"cubic-bspline\", \"four-point\", \"six-point\", \"2n-point\", \"nonuniform-bspline\" or \"incenter\"",
+            ),
+            Text("incenter"),
+            "through the points: incenter (round and convex where they are), four-point, six-point and 2n-point (for even \
+             distances; the more points, the smoother and the wider it swings); near them, without overshoot: chaikin, \
+             cubic-bspline, nonuniform-bspline (for uneven distances)",
+        ),
+        key(
+            "tension",
+            Kind::Number { min: 0.01, max: 0.125, unit: "" },
+            Number(0.0625),
+            "four-point only: how loose it is; towards 0 the polygon comes back",
+        ),
+        key(
+            "ends",
+            Kind::Choice(END_RULES),
+            Text("reflect"),
+            "four-, six-, 2n-point: at corners reflected about them, or by the points that there are (lagrange: swings more)",
+        ),
+        key(
+            "points",
+            Kind::Whole { min: 2, max: 16 },
+            Number(8.0),
+            "2n-point only: how many points count for each new one, an even number",
+        ),
+        key(
+            "fit",
+            Kind::Choice(FITS),
+            Text("control"),
+            "B-splines: the points pull the curve (control), or it passes through them",
+        ),
+        key(
+            "spacing",
+            Kind::Choice(SPACINGS),
+            Text("centripetal"),
+            "nonuniform-bspline only: knots by the root of the sides' lengths, by the lengths, or even",
+        ),
+        key(
+            "weights",
+            Kind::Forms("a list of [x, y, weight], x and y in mm, weights from 0.01 to 100"),
+            Rule("all 1"),
+            "nonuniform-bspline only: [[x, y, weight], ...]: above 1 the curve is pulled to the vertex nearest to x, y (mm)",
+        ),
+        key(
+            "update",
+            Kind::Number { min: 0.0, max: 0.5, unit: "" },
+            Number(0.25),
+            "incenter only: how far tangents follow at each step; 0 = arcs, 0.25 = evenest curvature",
+        ),
+        key(
+            "corner_deg",
+            deg(1.0, 180.0),
+            Number(40.0),
+            "vertices that turn by this much are corners and stay",
+        ),
+        key(
+            "corners",
+            Kind::Forms("a list of [x, y] in mm"),
+            Rule("none but those by corner_deg"),
+            "[[x, y], ...]: the vertex nearest to each place (mm, work coordinates) stays a corner, whatever its angle",
+        ),
+        key(
+            "curves",
+            Kind::Choice(CURVE_KINDS),
+            Text("keep"),
+            "drawn curves stay as they are (keep), or count by their ends and by points where they turn far (points)",
+        ),
+        key(
+            "levels",
+            Kind::Whole { min: 1, max: 10 },
+            Rule("until the outline is as fine as a drawn curve: chord_mm / 10"),
+            "steps of the scheme; each doubles the points",
+        ),
+    ],
+};
 
 /// The table form of `layer.surface`.
 pub(super) static SURFACE: Section = Section {

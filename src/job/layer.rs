@@ -10,6 +10,7 @@ use super::error::{JobError, Source, nearest, shown};
 use super::keys::{Key, LAYER, METHODS, PROFILES, SLOPE_CAP, SURFACE, rule};
 use super::reader::{Table, as_number};
 use super::settle::{TOUCHING_MM, round};
+use super::smooth::read_smooth;
 use super::surface::{
     Control, CrestSpec, Join, Profile, Prune, Scheme, Significance, SkeletonSpec, Split,
     SubdivisionSpec, SurfaceSpec,
@@ -173,6 +174,7 @@ fn layer(table: &Table<'_>, select: Selector, name: String) -> Result<LayerDraft
         feather_mm: table.sure_number("feather_mm"),
         draft_rad: table.sure_number("draft_deg").to_radians(),
         slope_cap: read_slope_cap(table)?,
+        smooth: read_smooth(table)?,
         union: table.flag("union"),
         visible: table.flag("visible"),
     };

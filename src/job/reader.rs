@@ -196,13 +196,24 @@ impl<'a> Table<'a> {
         word: &str,
         words: &[&str],
     ) -> JobError {
+        self.unknown_word_at(self.span_of(name), what, word, words)
+    }
+
+    /// The same for a word that stands elsewhere than behind a key of this table.
+    pub(super) fn unknown_word_at(
+        &self,
+        span: Range<usize>,
+        what: &str,
+        word: &str,
+        words: &[&str],
+    ) -> JobError {
         let message = format!("there is no {what} {}", shown(word));
         let list = words.join(", ");
         let (label, help) = match nearest(word, words.iter().copied()) {
             Some(near) => (format!("did you mean \"{near}\"?"), format!("there is: {list}")),
             None => ("not known".to_owned(), format!("there is: {list}")),
         };
-        JobError::UnknownName(self.source.fault(Some(self.span_of(name)), &message, &label, &help))
+        JobError::UnknownName(self.source.fault(Some(span), &message, &label, &help))
     }
 
     /// Refuses values that do not go together; points at `name`.

@@ -4,6 +4,7 @@
 
 use super::group::GroupSpec;
 use super::keys::COMBINES;
+use super::smooth::SmoothSpec;
 use super::surface::SurfaceSpec;
 use crate::geom::{Bounds, DVec2, DVec3, Tolerance};
 
@@ -408,6 +409,8 @@ pub struct LayerSpec {
     pub draft_rad: f64,
     /// Steepest slope (rise over run) that a narrow figure's flank may get; infinite = no cap.
     pub slope_cap: f64,
+    /// How its outlines are smoothed; `None`: not at all.
+    pub smooth: Option<SmoothSpec>,
     /// Melts the layer's paths into one figure.
     pub union: bool,
     /// Trims the layer to what the paint order leaves visible.

@@ -11,6 +11,7 @@ use super::keys::{
     SURFACE, Section, TOLERANCE, TOP, TRACE, TRACE_METHODS, WOOD, rule,
 };
 use super::library::Library;
+use super::smooth::smooth_lines;
 use super::surface::{Prune, SkeletonSpec, SurfaceSpec};
 use super::types::{
     Backdrop, Background, Connectivity, CutterShape, CutterSpec, Fit, Found, Job, LayerSpec,
@@ -20,7 +21,7 @@ use super::types::{
 use crate::geom::{DVec2, DVec3};
 
 /// A key with its value as TOML.
-type Line = (&'static str, String);
+pub(super) type Line = (&'static str, String);
 
 impl Job {
     /// The job as resolved: every value written out, machine, wood and cutters included, so that the
@@ -430,6 +431,7 @@ fn surface_lines(surface: &SurfaceSpec, of_picture: bool) -> Vec<Line> {
 fn layer_lines(layer: &LayerSpec, of_picture: bool) -> Vec<Line> {
     let surface = surface_lines(&layer.surface, of_picture);
     debug_assert!(surface.iter().all(|(name, _)| SURFACE.key(name).is_some()));
+    let smooth = layer.smooth.as_ref().map_or(quoted("none"), |s| inline(&smooth_lines(s)));
     let cap = if layer.slope_cap.is_finite() { number(layer.slope_cap) } else { quoted("none") };
     vec![
         ("name", quoted(&layer.name)),
@@ -443,6 +445,7 @@ fn layer_lines(layer: &LayerSpec, of_picture: bool) -> Vec<Line> {
         ("feather_mm", number(layer.feather_mm)),
         ("draft_deg", degrees(layer.draft_rad)),
         ("slope_cap", cap),
+        ("smooth_outline", smooth),
         ("union", layer.union.to_string()),
         ("visible", layer.visible.to_string()),
     ]
@@ -555,13 +558,13 @@ fn vector(v: DVec3) -> String {
 }
 
 /// The shortest decimal that reads back as the same number, without an exponent.
-fn number(value: f64) -> String {
+pub(super) fn number(value: f64) -> String {
     value.to_string()
 }
 
 /// An angle in degrees that reads back as the same number of radians: the shortest such decimal of up to 15
 /// digits, else the neighbour of the quotient that does it.
-fn degrees(radians: f64) -> String {
+pub(super) fn degrees(radians: f64) -> String {
     let exact = radians.to_degrees();
     let same = |degrees: f64| degrees.to_radians() == radians;
     for digits in 0..15_usize {
@@ -581,7 +584,7 @@ fn degrees(radians: f64) -> String {
 }
 
 /// A TOML basic string.
-fn quoted(text: &str) -> String {
+pub(super) fn quoted(text: &str) -> String {
     let mut out = String::from("\"");
     for c in text.chars() {
         match c {

@@ -1,10 +1,17 @@
 //! What was changed in the artwork, gathered by layer so that hundreds of paths make a handful of notes.
 
 use super::regions::PART_MM;
+use super::smooth::Smoothed;
 use crate::artwork::FillRule;
+use crate::geom::DVec2;
+use crate::geom::edge_grid::EdgeGrid;
+use crate::job::{DrawnCurves, SmoothSpec};
 
 /// Most shapes that one note names.
 const LISTED: usize = 3;
+
+/// Most crossings among which the one to show is chosen.
+const COMPARED: usize = 200;
 
 /// What happened to one shape of a layer.
 #[derive(Debug, Clone)]
@@ -31,6 +38,79 @@ pub(super) enum Gone {
     TooSmall,
     /// Shapes painted later cover it.
     Covered,
+}
+
+/// Crossings of an outline with itself that smoothing made.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct NewCrossings {
+    /// How many.
+    pub(super) count: usize,
+    /// Where one of them is, mm.
+    pub(super) at: DVec2,
+}
+
+impl NewCrossings {
+    /// Those of a smoothed outline that are more than the outline had as it was drawn; shown where no old one is near.
+    pub(super) fn between(drawn: &EdgeGrid, smoothed: &EdgeGrid, limit: usize) -> Option<Self> {
+        let count = smoothed.crossings(limit).saturating_sub(drawn.crossings(limit));
+        let known = drawn.crossing_points(COMPARED);
+        let from_known =
+            |p: &DVec2| known.iter().map(|q| q.distance_squared(*p)).fold(f64::INFINITY, f64::min);
+        let farther = |a: &DVec2, b: &DVec2| from_known(a).total_cmp(&from_known(b));
+        let at = smoothed.crossing_points(COMPARED).into_iter().max_by(farther)?;
+        (count > 0).then_some(Self { count, at })
+    }
+}
+
+/// The notes on what smoothing did to the shapes of one layer.
+pub(super) fn of_smoothing<'a>(
+    layer: &str,
+    spec: &SmoothSpec,
+    shapes: impl Iterator<Item = (String, &'a Smoothed, Option<&'a NewCrossings>)>,
+) -> Vec<String> {
+    let (mut rounded, mut corners, mut curves) = (0, 0, 0);
+    let mut crossed = Vec::new();
+    for (shape, smoothed, crossings) in shapes {
+        rounded += smoothed.rounded;
+        corners += smoothed.corners;
+        curves += smoothed.curves;
+        if let Some(NewCrossings { count, at }) = crossings {
+            crossed.push(format!(
+                "{shape} {} near {:.2}, {:.2}",
+                counted(*count, "time"),
+                at.x,
+                at.y
+            ));
+        }
+    }
+    let mut out = Vec::new();
+    if !crossed.is_empty() {
+        let shapes =
+            if crossed.len() == 1 { "shape crosses itself" } else { "shapes cross themselves" };
+        out.push(format!(
+            "layer '{layer}': {} {shapes} where smooth_outline made loops, and what they hold was resolved by its own fill \
+             rule: {}; name a corner there (corners), lower corner_deg, or take chaikin or cubic-bspline, which do not \
+             overshoot",
+            crossed.len(),
+            listed(&crossed)
+        ));
+    }
+    if rounded == 0 {
+        let mut why = Vec::new();
+        if corners > 0 {
+            let degrees = spec.corner_rad.to_degrees();
+            let are = if corners == 1 { "vertex is a corner" } else { "vertices are corners" };
+            why.push(format!(
+                "{corners} {are} (they turn by corner_deg = {degrees:.0} or more, or borders meet there)"
+            ));
+        }
+        if curves > 0 && spec.curves == DrawnCurves::Keep {
+            let are = if curves == 1 { "drawn curve is kept" } else { "drawn curves are kept" };
+            why.push(format!("{curves} {are} (curves = \"points\" smooths through their ends)"));
+        }
+        out.push(format!("layer '{layer}': smooth_outline changes nothing: {}", why.join("; ")));
+    }
+    out
 }
 
 /// The notes on one layer, whose parts smaller than a square of `chord_mm` were left out.

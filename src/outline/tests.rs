@@ -2,6 +2,7 @@
 
 mod laws;
 mod random;
+mod smooth;
 
 use std::f64::consts::PI;
 
@@ -24,6 +25,7 @@ fn layer(select: Selector) -> LayerSpec {
         draft_rad: 0.0,
         slope_cap: f64::INFINITY,
         union: false,
+        smooth: None,
         visible: false,
     }
 }

@@ -1,9 +1,12 @@
 //! Placed shapes -> the outlines of every layer.
 
+use std::collections::BTreeMap;
+
 use rayon::prelude::*;
 
-use super::notes::{self, Change, Gone};
+use super::notes::{self, Change, Gone, NewCrossings};
 use super::regions::{self, Built};
+use super::smooth::{Junctions, Smoothed, Smoother};
 use super::{Figure, OutlineError, OutlineLayer, Outlines};
 use crate::artwork::boolean::{self, FixedGrid, NodeRing};
 use crate::artwork::{FillRule, Part, Placed, Shape, curve};
@@ -21,7 +24,7 @@ const FLATTEN_PER_CHORD: f64 = 0.1;
 /// Most crossings that are resolved in one shape.
 const MAX_CROSSINGS: usize = 200_000;
 
-/// Turns the shapes of every layer into regions: flattened to within `chord_mm`, resolved by their own fill
+/// Turns the shapes of every layer into regions: flattened to within `chord_mm` (or smoothed), resolved by their own fill
 /// rules, parted where they touch, oriented, nested. Each shape is a figure of its own unless the layer's
 /// `union` melts them; with `visible` a layer keeps only what no later shape of the artwork covers.
 ///
@@ -40,8 +43,8 @@ pub fn trace(
     }
     let tracer = Tracer::new(placed, layers, chord_mm)?;
     let mut out = Outlines { layers: Vec::with_capacity(layers.len()), notes: Vec::new() };
-    for (layer, indices) in layers.iter().zip(&placed.layers) {
-        let (traced, notes) = tracer.layer(layer, indices)?;
+    for (index, (layer, indices)) in layers.iter().zip(&placed.layers).enumerate() {
+        let (traced, notes) = tracer.layer(index, layer, indices)?;
         out.layers.push(traced);
         out.notes.extend(notes);
     }
@@ -56,9 +59,24 @@ pub fn trace(
     Ok(out)
 }
 
+/// Which version of a shape: its index, and the layer whose `smooth_outline` it has; `None` as drawn.
+type Version = (usize, Option<usize>);
+
+/// A shape as rings.
+struct Flat {
+    rings: Vec<Vec<DVec2>>,
+    /// What smoothing did to it.
+    smoothed: Option<Smoothed>,
+    /// Where it crosses itself though it did not before it was smoothed.
+    new_crossings: Option<NewCrossings>,
+    crossings: usize,
+}
+
 /// A shape by its own fill rule, on the common grid.
 struct Resolved {
     rings: Vec<NodeRing>,
+    smoothed: Option<Smoothed>,
+    new_crossings: Option<NewCrossings>,
     crossings: usize,
     low: (i32, i32),
     high: (i32, i32),
@@ -74,43 +92,86 @@ struct Left {
 struct Tracer<'a> {
     shapes: &'a [Shape],
     grid: FixedGrid,
-    /// For each shape that is needed.
-    resolved: Vec<Option<Resolved>>,
+    /// All that are needed.
+    resolved: BTreeMap<Version, Resolved>,
+    /// For each shape the version that covers what lies below it.
+    covering: Vec<Version>,
     chord_mm: f64,
 }
 
 impl<'a> Tracer<'a> {
     fn new(placed: &'a Placed, layers: &[LayerSpec], chord_mm: f64) -> Result<Self, OutlineError> {
-        let grid = FixedGrid::covering(&placed.bounds);
-        let mut needed = vec![layers.iter().any(|l| l.visible); placed.shapes.len()];
-        for i in placed.layers.iter().flatten() {
-            needed[*i] = true;
+        let shapes = &placed.shapes;
+        let version = |layer: usize, i: usize| (i, layers[layer].smooth.as_ref().map(|_| layer));
+        // What lies above covers as it is carved: as the topmost layer has it.
+        let mut covering: Vec<Version> = (0..shapes.len()).map(|i| (i, None)).collect();
+        let mut needed = Vec::new();
+        for (layer, taken) in placed.layers.iter().enumerate() {
+            for &i in taken {
+                covering[i] = version(layer, i);
+                needed.push(version(layer, i));
+            }
         }
-        let each: Vec<_> = placed
-            .shapes
-            .par_iter()
-            .zip(needed)
-            .map(|(shape, needed)| {
-                let wanted = needed && shape.is_carvable();
-                wanted.then(|| resolve(shape, &grid, chord_mm)).transpose()
+        if layers.iter().any(|l| l.visible) {
+            needed.extend(&covering);
+        }
+        needed.retain(|(i, _)| shapes[*i].is_carvable());
+        needed.sort_unstable();
+        needed.dedup();
+
+        let tolerance_mm = chord_mm * FLATTEN_PER_CHORD;
+        let smooth = layers.iter().any(|l| l.smooth.is_some());
+        let junctions = Junctions::of(shapes.iter().filter(|s| smooth && s.is_carvable()));
+        let smoothers: Vec<Option<Smoother<'_>>> = layers
+            .iter()
+            .zip(&placed.layers)
+            .map(|(layer, taken)| {
+                let own: Vec<&Shape> = taken.iter().map(|&i| &shapes[i]).collect();
+                let smoother = |spec| {
+                    Smoother::new(&layer.name, spec, &junctions, &own, tolerance_mm, MAX_CHORDS)
+                };
+                layer.smooth.as_ref().map(smoother).transpose()
             })
+            .collect::<Result<_, _>>()?;
+        let flats: Vec<Flat> = needed
+            .par_iter()
+            .map(|&(i, layer)| {
+                let smoother = layer.and_then(|layer| smoothers[layer].as_ref());
+                flat(&shapes[i], smoother, chord_mm)
+            })
+            .collect::<Vec<_>>()
+            .into_iter()
+            .collect::<Result<_, _>>()?;
+        // A smoothed outline may swing out of what was drawn.
+        let swung = flats.iter().filter(|flat| flat.smoothed.is_some()).flat_map(|f| &f.rings);
+        let bounds = swung.fold(placed.bounds, |all, ring| all.union(&bounds_of(ring)));
+        let grid = FixedGrid::covering(&bounds);
+        let each: Vec<Resolved> = needed
+            .par_iter()
+            .zip(flats)
+            .map(|((i, _), flat)| resolve(&shapes[*i], flat, &grid))
             .collect();
-        let resolved = each.into_iter().collect::<Result<_, _>>()?;
-        Ok(Self { shapes: &placed.shapes, grid, resolved, chord_mm })
+        let resolved = needed.into_iter().zip(each).collect();
+        Ok(Self { shapes, grid, resolved, covering, chord_mm })
     }
 
+    /// The outlines of the layer of this index.
     fn layer(
         &self,
+        index: usize,
         layer: &LayerSpec,
         indices: &[usize],
     ) -> Result<(OutlineLayer, Vec<String>), OutlineError> {
-        let rings_of = |&i: &usize| {
-            let rings = self.resolved[i].as_ref().map_or(Vec::new(), |r| r.rings.clone());
-            if !layer.visible || rings.is_empty() {
-                return Left { rings, covered: false };
+        let of = |i: usize| self.resolved.get(&(i, layer.smooth.as_ref().map(|_| index)));
+        let rings_of = |&i: &usize| match of(i) {
+            None => Left { rings: Vec::new(), covered: false },
+            Some(own) if !layer.visible || own.rings.is_empty() => {
+                Left { rings: own.rings.clone(), covered: false }
             }
-            let rings = self.uncovered(i, rings);
-            Left { covered: rings.is_empty(), rings }
+            Some(own) => {
+                let rings = self.uncovered(i, own);
+                Left { covered: rings.is_empty(), rings }
+            }
         };
         let traced: Vec<(Figure, Change)> = if layer.union {
             let parts: Vec<Left> = indices.par_iter().map(rings_of).collect();
@@ -129,7 +190,8 @@ impl<'a> Tracer<'a> {
                     let shape = &self.shapes[*i];
                     // The outline of a stroke crosses itself by the way it is made: nothing to tell.
                     let own = shape.part == Part::Fill;
-                    let crossings = self.resolved[*i].as_ref().map_or(0, |r| r.crossings);
+                    let crossings = of(*i)
+                        .map_or(0, |r| r.crossings - r.new_crossings.map_or(0, |new| new.count));
                     let crossings = if own { crossings } else { 0 };
                     self.figure(name(shape), shape.rule, crossings, rings_of(i))
                 })
@@ -137,7 +199,14 @@ impl<'a> Tracer<'a> {
             each.into_iter().collect::<Result<_, _>>()?
         };
         let (figures, changes): (Vec<Figure>, Vec<Change>) = traced.into_iter().unzip();
-        let notes = notes::of_layer(&layer.name, &changes, self.chord_mm);
+        let mut notes = notes::of_layer(&layer.name, &changes, self.chord_mm);
+        if let Some(spec) = &layer.smooth {
+            let smoothed = indices.iter().filter_map(|&i| {
+                let own = of(i)?;
+                Some((name(&self.shapes[i]), own.smoothed.as_ref()?, own.new_crossings.as_ref()))
+            });
+            notes.extend(notes::of_smoothing(&layer.name, spec, smoothed));
+        }
         let figures: Vec<Figure> = figures.into_iter().filter(|f| !f.regions.is_empty()).collect();
         if figures.is_empty() {
             let why =
@@ -172,21 +241,25 @@ impl<'a> Tracer<'a> {
     }
 
     /// What no later shape of the artwork covers.
-    fn uncovered(&self, index: usize, rings: Vec<NodeRing>) -> Vec<NodeRing> {
-        let Some(own) = &self.resolved[index] else { return rings };
+    fn uncovered(&self, index: usize, own: &Resolved) -> Vec<NodeRing> {
         let meets = |other: &&Resolved| {
             other.low.0 <= own.high.0
                 && own.low.0 <= other.high.0
                 && other.low.1 <= own.high.1
                 && own.low.1 <= other.high.1
         };
-        let later = self.resolved[index + 1..].iter().flatten().filter(meets);
-        let cover: Vec<NodeRing> = later.flat_map(|r| r.rings.iter().cloned()).collect();
-        if cover.is_empty() { rings } else { boolean::difference(&rings, &cover) }
+        let later = self.covering[index + 1..].iter().filter_map(|v| self.resolved.get(v));
+        let cover: Vec<NodeRing> =
+            later.filter(meets).flat_map(|r| r.rings.iter().cloned()).collect();
+        if cover.is_empty() { own.rings.clone() } else { boolean::difference(&own.rings, &cover) }
     }
 }
 
-fn resolve(shape: &Shape, grid: &FixedGrid, chord_mm: f64) -> Result<Resolved, OutlineError> {
+fn flat(
+    shape: &Shape,
+    smoother: Option<&Smoother<'_>>,
+    chord_mm: f64,
+) -> Result<Flat, OutlineError> {
     let finite = |p: kurbo::Point| p.x.is_finite() && p.y.is_finite();
     let all_finite = shape.curve.elements().iter().all(|el| match *el {
         kurbo::PathEl::MoveTo(a) | kurbo::PathEl::LineTo(a) => finite(a),
@@ -197,29 +270,50 @@ fn resolve(shape: &Shape, grid: &FixedGrid, chord_mm: f64) -> Result<Resolved, O
     if !all_finite {
         return Err(OutlineError::NotFinite { shape: name(shape) });
     }
-    let rings = curve::flatten(&shape.curve, chord_mm * FLATTEN_PER_CHORD);
+    let drawn = || curve::flatten(&shape.curve, chord_mm * FLATTEN_PER_CHORD);
+    let mut smoothed = match smoother {
+        Some(smoother) => Some(smoother.smooth(&shape.curve).map_err(|fault| fault.of(shape))?),
+        None => None,
+    };
+    let rings = smoothed.as_mut().map_or_else(drawn, |s| std::mem::take(&mut s.rings));
     if rings.iter().map(Vec::len).sum::<usize>() > MAX_CHORDS {
         let (shape, limit) = (name(shape), MAX_CHORDS);
         return Err(OutlineError::TooFine { shape, chord_mm, limit });
     }
-    let crossings = EdgeGrid::new(rings.iter().map(Vec::as_slice)).crossings(MAX_CROSSINGS);
+    let grid = EdgeGrid::new(rings.iter().map(Vec::as_slice));
+    let crossings = grid.crossings(MAX_CROSSINGS);
     if crossings > MAX_CROSSINGS {
         return Err(OutlineError::Scribble { shape: name(shape), limit: MAX_CROSSINGS });
     }
+    let new_crossings = match smoothed {
+        Some(_) if crossings > 0 => {
+            let drawn = drawn();
+            let drawn = EdgeGrid::new(drawn.iter().map(Vec::as_slice));
+            NewCrossings::between(&drawn, &grid, MAX_CROSSINGS)
+        }
+        _ => None,
+    };
+    Ok(Flat { rings, smoothed, new_crossings, crossings })
+}
+
+fn resolve(shape: &Shape, flat: Flat, grid: &FixedGrid) -> Resolved {
+    let Flat { rings, smoothed, new_crossings, crossings } = flat;
     let points: Vec<DVec2> = rings.iter().flatten().copied().collect();
     let bounds = bounds_of(&points);
     let rings: Vec<NodeRing> = rings.iter().map(|r| grid.snap_ring(r)).collect();
     let (low, high) = (grid.snap(bounds.min), grid.snap(bounds.max));
-    Ok(Resolved {
+    Resolved {
         rings: boolean::resolve(&rings, shape.rule),
+        smoothed,
+        new_crossings,
         crossings,
         low: (low.x, low.y),
         high: (high.x, high.y),
-    })
+    }
 }
 
 /// A shape for messages.
-fn name(shape: &Shape) -> String {
+pub(super) fn name(shape: &Shape) -> String {
     match shape.part {
         Part::Stroke => format!("stroke of {}", shape.source),
         Part::Fill | Part::Open => shape.source.clone(),

@@ -86,6 +86,7 @@ fn flat(name: &str, z_mm: f64, combine: Combine) -> LayerSpec {
         draft_rad: 0.0,
         slope_cap: f64::INFINITY,
         union: false,
+        smooth: None,
         visible: false,
     }
 }

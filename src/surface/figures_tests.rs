@@ -289,6 +289,7 @@ pub(super) fn raise_region(
         draft_rad: 0.0,
         slope_cap: 4.0,
         union: false,
+        smooth: None,
         visible: false,
     };
     let grid = Grid::covering(DVec2::ZERO, 12.0, 12.0, 0.15).unwrap();

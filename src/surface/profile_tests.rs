@@ -19,6 +19,7 @@ fn layer(base_mm: f64, height_mm: f64, profile: Profile, radius_mm: Option<f64>)
         draft_rad: 0.0,
         slope_cap: f64::INFINITY,
         union: false,
+        smooth: None,
         visible: false,
     }
 }

@@ -37,6 +37,7 @@ pub(crate) fn job(
         draft_rad: 0.0,
         slope_cap: f64::INFINITY,
         union: false,
+        smooth: None,
         visible: false,
     };
     Job {

@@ -356,6 +356,7 @@ mod placing {
             draft_rad: 0.0,
             slope_cap: f64::INFINITY,
             union: false,
+            smooth: None,
             visible: false,
         }
     }

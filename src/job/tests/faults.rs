@@ -363,6 +363,58 @@ fn settings_of_surfaces_that_do_not_belong_together_are_refused() {
     }
 }
 
+/// Keys of `smooth_outline`: unknown words, foreign keys and odd values are refused at their place.
+#[test]
+fn smoothing_that_cannot_be_is_refused() {
+    let layer =
+        |smooth: &str| with(&format!("[[layer]]\nselect = \"all\"\nsmooth_outline = {smooth}\n"));
+    let refuse = |smooth: &str, value: &str, kind: fn(&JobError) -> bool, words: &[&str]| {
+        let column = "smooth_outline = ".len() + smooth.find(value).unwrap() + 1;
+        refused(&layer(smooth), kind, (5, column), words);
+    };
+    let name = |e: &JobError| matches!(e, JobError::UnknownName(_));
+    refuse("\"for-point\"", "\"for", name, &["did you mean \"four-point\"?", "incenter"]);
+    refuse("{ method = \"chaikn\" }", "\"chaikn", name, &["did you mean \"chaikin\"?"]);
+    let impossible = |e: &JobError| matches!(e, JobError::Impossible(_));
+    for (smooth, value, words) in [
+        ("{ method = \"chaikin\", tension = 0.05 }", "0.05", ["tension", "\"four-point\""]),
+        ("{ method = \"incenter\", ends = \"lagrange\" }", "\"lagrange", ["ends", "\"six-point\""]),
+        ("{ method = \"four-point\", points = 4 }", "4 }", ["points", "\"2n-point\""]),
+        (
+            "{ method = \"four-point\", fit = \"through\" }",
+            "\"through",
+            ["fit", "\"cubic-bspline\""],
+        ),
+        ("{ method = \"cubic-bspline\", weights = [[1, 2, 3]] }", "[[1", ["weights", "nonuniform"]),
+        ("{ method = \"chaikin\", update = 0.2 }", "0.2", ["update", "\"incenter\""]),
+        ("{ method = \"2n-point\", points = 7 }", "7 }", ["even", "odd"]),
+        (
+            "{ method = \"nonuniform-bspline\", fit = \"through\", weights = [[1, 2, 3]] }",
+            "[[1",
+            ["weights", "control"],
+        ),
+    ] {
+        refuse(smooth, value, impossible, &words);
+    }
+    let kind = |e: &JobError| matches!(e, JobError::WrongType(_));
+    refuse("3", "3", kind, &["this is a whole number", "four-point"]);
+    refuse("{ corners = [[1, 2, 3]] }", "[1", kind, &["a list of [x, y]"]);
+    refuse("{ corners = 5 }", "5", kind, &["a list of [x, y]"]);
+    refuse("{ corners = [[1, \"2\"]] }", "\"2", kind, &["this is text"]);
+    let range = |e: &JobError| matches!(e, JobError::OutOfRange(_));
+    refuse("{ method = \"four-point\", tension = 0.2 }", "0.2", range, &["between 0.01 and 0.125"]);
+    refuse("{ corners = [[1, 2], [1e9, 2]] }", "1e9", range, &["between -10000 and 10000"]);
+    refuse(
+        "{ method = \"nonuniform-bspline\", weights = [[1, 2, 0]] }",
+        "0]",
+        range,
+        &["between 0.01 and 100"],
+    );
+    let key = |e: &JobError| matches!(e, JobError::UnknownKey(_) | JobError::WrongUnit(_));
+    refuse("{ metod = \"chaikin\" }", "metod", key, &["did you mean `method`?"]);
+    refuse("{ corner = 40 }", "corner", key, &["corner_deg"]);
+}
+
 #[test]
 fn cutters_that_cannot_be_are_refused() {
     let refuse = |form: &str, words: &[&str]| {

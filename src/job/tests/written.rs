@@ -43,6 +43,70 @@ fn uncommented(text: &str) -> String {
 }
 
 #[test]
+fn smoothing_is_read_with_its_defaults_and_written_as_it_is_read() {
+    use crate::geom::curves::{EndRule, Fit as Through, Scheme, Spacing};
+    let layers = |smooth: &str| {
+        let key =
+            if smooth.is_empty() { String::new() } else { format!("smooth_outline = {smooth}\n") };
+        job(&with(&format!("[[layer]]\nselect = \"all\"\n{key}"))).unwrap()
+    };
+    let spec = |scheme| SmoothSpec {
+        scheme,
+        corner_rad: 40_f64.to_radians(),
+        corners: vec![],
+        weights: vec![],
+        curves: DrawnCurves::Keep,
+        levels: None,
+    };
+    let own = |smooth: &str| layers(smooth).layers[0].smooth.clone();
+    assert_eq!((own(""), own("\"none\"")), (None, None));
+    let (reflect, control) = (EndRule::Reflect, Through::Control);
+    let spacing = Spacing::Centripetal;
+    for (word, scheme) in [
+        ("chaikin", Scheme::Chaikin),
+        ("cubic-bspline", Scheme::CubicBspline { fit: control }),
+        ("four-point", Scheme::FourPoint { tension: 0.0625, ends: reflect }),
+        ("six-point", Scheme::TwoNPoint { pairs: 3, ends: reflect }),
+        ("2n-point", Scheme::TwoNPoint { pairs: 4, ends: reflect }),
+        ("nonuniform-bspline", Scheme::NonuniformBspline { fit: control, spacing }),
+        ("incenter", Scheme::Incenter { update: 0.25 }),
+    ] {
+        assert_eq!(own(&format!("\"{word}\"")), Some(spec(scheme)), "{word}");
+        assert_eq!(own(&format!("{{ method = \"{word}\" }}")), Some(spec(scheme)), "{word}");
+    }
+    assert_eq!(own("{ corner_deg = 40 }"), own("\"incenter\""));
+    let full = own(
+        "{ method = \"nonuniform-bspline\", spacing = \"chord\", weights = [[1, -2.5, 3]], corners = [[4, 5], [6, 7.25]], \
+         corner_deg = 33, curves = \"points\", levels = 5 }",
+    );
+    let wanted = SmoothSpec {
+        corner_rad: 33_f64.to_radians(),
+        corners: vec![DVec2::new(4.0, 5.0), DVec2::new(6.0, 7.25)],
+        weights: vec![[1.0, -2.5, 3.0]],
+        curves: DrawnCurves::Points,
+        levels: Some(5),
+        ..spec(Scheme::NonuniformBspline { fit: control, spacing: Spacing::Chord })
+    };
+    assert_eq!(full, Some(wanted));
+    for smooth in [
+        "\"none\"",
+        "\"chaikin\"",
+        "{ method = \"cubic-bspline\", fit = \"through\" }",
+        "{ method = \"four-point\", tension = 0.1, ends = \"lagrange\" }",
+        "\"six-point\"",
+        "{ method = \"2n-point\", points = 10, levels = 3 }",
+        "{ method = \"nonuniform-bspline\", weights = [[1, 2, 3], [4, 5, 0.5]], corners = [[0, 1]] }",
+        "{ method = \"incenter\", update = 0, corner_deg = 61.7, curves = \"points\" }",
+    ] {
+        let first = layers(smooth);
+        let written = first.to_toml();
+        let second = job(&written).unwrap();
+        assert_eq!(second.layers, first.layers, "{written}");
+        assert_eq!(second.to_toml(), written);
+    }
+}
+
+#[test]
 fn the_template_shows_the_artwork() {
     let text = template("lotus.svg", &found(), &Library::built_in()).unwrap();
     assert_eq!(text.matches("[[layer]]").count(), 2);
