@@ -43,7 +43,10 @@ pub use ratio::{
 pub use ridge::{Heights, Ridge};
 pub use ruled::{Density, RuledFault, check as check_ruled, mesh as ruled_mesh};
 pub use rungs::{Rungs, rungs};
-pub use subdivide::{MOST_FACES, PolyMesh, SubdivideError, Topology, adaptive, limit, subdivide};
+pub use subdivide::{
+    ClosedForm, EvaluateError, IsoFault, LimitRows, LimitSurface, MOST_FACES, PolyMesh, Sample,
+    SpacedMesh, SubdivideError, Topology, adaptive, iso_line, limit, limit_rows, subdivide,
+};
 
 use crate::geom::{Bounds, Grid, Tolerance};
 use crate::job::{LayerSpec, SurfaceSpec};
