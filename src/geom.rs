@@ -20,7 +20,7 @@ mod moves;
 mod polygon;
 
 pub use distance::distance_field;
-pub use glam::{DVec2, DVec3};
+pub use glam::{DVec2, DVec3, DVec4};
 pub use heightfield::{Grid, GridError, Heightfield};
 pub use moves::{Move, MoveKind};
 pub use polygon::{
