@@ -57,6 +57,8 @@ pub enum Part {
 pub struct Shape {
     /// The curves, y up; in the artwork's own units until placed, then in mm in work coordinates.
     pub curve: kurbo::BezPath,
+    /// The line that a stroke follows, in the same units; `None` for all else.
+    pub course: Option<kurbo::BezPath>,
     /// Which points they hold.
     pub rule: FillRule,
     /// Fill or stroke.
@@ -92,15 +94,19 @@ impl Shape {
 
     /// True when the selector names this shape; never for an open path.
     pub fn is_selected_by(&self, select: &Selector) -> bool {
-        self.is_carvable()
-            && match select {
-                Selector::All => true,
-                Selector::Fill(color) => self.part == Part::Fill && self.color == *color,
-                Selector::Stroke(color) => self.part == Part::Stroke && self.color == *color,
-                Selector::Label(label) => self.labels.contains(label),
-                Selector::Id(id) => self.ids.contains(id),
-                Selector::Layer(label) => self.layers.contains(label),
-            }
+        self.is_carvable() && self.is_named_by(select)
+    }
+
+    /// True when the selector names this shape, be it to be carved or a line.
+    pub fn is_named_by(&self, select: &Selector) -> bool {
+        match select {
+            Selector::All => true,
+            Selector::Fill(color) => self.part == Part::Fill && self.color == *color,
+            Selector::Stroke(color) => self.part == Part::Stroke && self.color == *color,
+            Selector::Label(label) => self.labels.contains(label),
+            Selector::Id(id) => self.ids.contains(id),
+            Selector::Layer(label) => self.layers.contains(label),
+        }
     }
 }
 

@@ -122,7 +122,11 @@ pub fn raise(subject: &Subject, method: &str) -> Result<Raised, CompareError> {
         .zip(&layers)
         .map(|(outline, layer)| {
             let figures = outline.figures.par_iter().with_max_len(1);
-            figures.map(|figure| raise_figure(figure, layer, subject.grid(), tolerance)).collect()
+            figures
+                .map(|figure| {
+                    raise_figure(figure, layer, &outline.ridges, subject.grid(), tolerance)
+                })
+                .collect()
         })
         .collect();
     Ok(Raised { method: method.to_owned(), layers, figures: figures? })

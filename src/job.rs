@@ -14,6 +14,7 @@ mod cutter;
 mod library;
 mod draft;
 mod speeds;
+mod crest;
 mod layer;
 mod group;
 mod operation;
@@ -29,8 +30,8 @@ pub use group::GroupSpec;
 pub use library::{BUILT_IN_FILES, Library};
 pub use smooth::{DrawnCurves, SmoothSpec};
 pub use surface::{
-    Control, CrestSpec, Join, Profile, Prune, Scheme, Significance, SkeletonSpec, Split,
-    SubdivisionSpec, SurfaceSpec,
+    Control, CourseSpec, CrestSpec, DrawnCrestSpec, DrawnSpec, Join, Profile, Prune, Scheme,
+    Significance, SkeletonSpec, Split, SubdivisionSpec, SurfaceSpec,
 };
 pub use types::{
     ArtworkSpec, Backdrop, Background, Combine, Connectivity, CutterShape, CutterSpec, Fit, Follow,

@@ -71,6 +71,21 @@ pub struct OutlineLayer {
     pub name: String,
     /// Its figures; never empty.
     pub figures: Vec<Figure>,
+    /// The ridge lines that it draws from the artwork.
+    pub ridges: Vec<RidgePath>,
+}
+
+/// A ridge line from the artwork.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RidgePath {
+    /// Which of the layer's crests it belongs to, from 0.
+    pub crest: usize,
+    /// For messages: `path 'vein' (line 7)`.
+    pub source: String,
+    /// Its points, mm; of a closed one the first is not repeated.
+    pub points: Vec<DVec2>,
+    /// It ends where it starts.
+    pub closed: bool,
 }
 
 /// The outlines of all layers, bottom to top, one for each layer of the job.
@@ -149,6 +164,20 @@ pub enum OutlineError {
         shape: String,
         /// Most crossings that are resolved.
         limit: usize,
+    },
+    /// A crest that names nothing.
+    #[error(
+        "layer '{layer}': no path in the artwork is {select}, which its crest {crest} names; there is {there_is}"
+    )]
+    NoCrestPath {
+        /// Name of the layer.
+        layer: String,
+        /// Number of the crest, from 1.
+        crest: usize,
+        /// What it names.
+        select: crate::job::Selector,
+        /// Names of lines that are there.
+        there_is: String,
     },
     /// An outline that stays broken after resolving: a bug of ours if it ever happens.
     #[error("{shape}: {fault}; simplify the path there")]

@@ -8,6 +8,7 @@ mod control;
 mod crest;
 mod crested;
 mod distance;
+mod drawn;
 mod fields;
 mod harmonic;
 mod inscribed;
@@ -29,6 +30,9 @@ mod weld;
 pub use control::{Rim, control};
 pub use crested::{Fineness, Skeleton, Subdivided, lower_walls, ridge_of};
 pub use distance::Segments;
+pub use drawn::{
+    Control, Course, CrestFault, DrawnCrest, DrawnSettings, control_over, drawn_path, drawn_surface,
+};
 pub use fields::{Rise, r_function, scan_lines};
 pub use inscribed::inscribed_radius;
 pub use inside::inside_spans;
@@ -43,11 +47,14 @@ pub use ratio::{
 pub use ridge::{Heights, Ridge};
 pub use ruled::{Density, RuledFault, check as check_ruled, mesh as ruled_mesh};
 pub use rungs::{Rungs, rungs};
-pub use subdivide::{MOST_FACES, PolyMesh, SubdivideError, Topology, adaptive, limit, subdivide};
+pub use subdivide::{
+    ClosedForm, EvaluateError, IsoFault, LimitRows, LimitSurface, MOST_FACES, PolyMesh, Sample,
+    SpacedMesh, SubdivideError, Topology, adaptive, iso_line, limit, limit_rows, subdivide,
+};
 
 use crate::geom::{Bounds, Grid, Tolerance};
 use crate::job::{LayerSpec, SurfaceSpec};
-use crate::outline::{Figure, Outlines};
+use crate::outline::{Figure, Outlines, RidgePath};
 use crate::skeleton::SkeletonError;
 use rayon::prelude::*;
 
@@ -78,6 +85,14 @@ pub enum SurfaceError {
         layer: String,
         /// The figure, as its source names it.
         figure: String,
+    },
+    /// The ridge lines of the layer cannot be carved.
+    #[error("layer '{layer}': {fault}")]
+    Crest {
+        /// Name of the layer.
+        layer: String,
+        /// Why: what, where and what to change.
+        fault: CrestFault,
     },
     /// A setting of the layer is NaN, infinite or of the wrong sign.
     #[error("layer '{layer}': {key} = {value} cannot be used; {cure}")]
@@ -153,6 +168,13 @@ pub enum Remark {
         /// Part of its vertices that moved.
         part: f64,
     },
+    /// The surface over drawn crests folds over itself in plan: the highest part counts.
+    Folded {
+        /// Number of triangles that are turned over.
+        count: usize,
+        /// The first of them, mm.
+        at: crate::geom::DVec2,
+    },
     /// The ridge was asked to lie below the outline; it lies level with it.
     RidgeBelowBase,
     /// It reaches past the edge of the stock and is cut off there.
@@ -180,13 +202,14 @@ pub struct Raised {
     pub notes: Vec<String>,
 }
 
-/// Raises one figure over the grid by the method of its layer.
+/// Raises one figure over the grid by the method of its layer; `ridges` are the layer's ridge lines from the artwork.
 ///
 /// # Errors
-/// [`SurfaceError`]: an outline or a setting that is not a usable number.
+/// [`SurfaceError`]: an outline or a setting that is not a usable number, or ridge lines that cannot be carved.
 pub fn raise(
     figure: &Figure,
     layer: &LayerSpec,
+    ridges: &[RidgePath],
     grid: &Grid,
     tolerance: &Tolerance,
 ) -> Result<RaisedFigure, SurfaceError> {
@@ -209,6 +232,11 @@ pub fn raise(
         (SurfaceSpec::RFunction { .. } | SurfaceSpec::ScanLines { .. }, _) => {
             Surface::Field(fields::raise(figure, layer, grid, tolerance, &mut remarks))
         }
+        (SurfaceSpec::Drawn(spec), _) => {
+            let over = drawn::Over { layer, spec, ridges, grid, tolerance };
+            drawn::raise(figure, &over, &mut remarks)
+                .map_err(|fault| SurfaceError::Crest { layer: layer.name.clone(), fault })?
+        }
         (_, Some(crest)) => crested::raise(figure, layer, crest, grid, tolerance, &mut remarks),
         (_, None) => Surface::Parts(Vec::new()),
     };
@@ -226,13 +254,17 @@ pub fn raise_all(
     grid: &Grid,
     tolerance: &Tolerance,
 ) -> Result<Raised, SurfaceError> {
+    for (outline, layer) in outlines.layers.iter().zip(layers) {
+        drawn::check_used(outline, layer)
+            .map_err(|fault| SurfaceError::Crest { layer: layer.name.clone(), fault })?;
+    }
     let figures: Vec<(usize, &Figure)> = (outlines.layers.iter().enumerate().take(layers.len()))
         .flat_map(|(l, layer)| layer.figures.iter().map(move |figure| (l, figure)))
         .collect();
     let raised: Vec<Result<RaisedFigure, SurfaceError>> = figures
         .par_iter()
         .with_max_len(1)
-        .map(|&(l, figure)| raise(figure, &layers[l], grid, tolerance))
+        .map(|&(l, figure)| raise(figure, &layers[l], &outlines.layers[l].ridges, grid, tolerance))
         .collect();
     let mut surfaces: Vec<Vec<Surface>> = layers.iter().map(|_| Vec::new()).collect();
     let mut remarks: Vec<Vec<(&str, Remark)>> = layers.iter().map(|_| Vec::new()).collect();

@@ -107,6 +107,16 @@ fn mountains_carve() {
 }
 
 #[test]
+fn leaf_carves() {
+    carve(&samples().into_iter().find(|s| name(s) == "leaf").unwrap());
+}
+
+#[test]
+fn scroll_carves() {
+    carve(&samples().into_iter().find(|s| name(s) == "scroll").unwrap());
+}
+
+#[test]
 fn tiger_carves() {
     carve(&samples().into_iter().find(|s| name(s) == "tiger").unwrap());
 }

@@ -48,6 +48,36 @@ pub(crate) fn flatten(path: &BezPath, tolerance: f64) -> Vec<Vec<DVec2>> {
     rings
 }
 
+/// The subpaths of a path as polylines, curves as chords at most `tolerance` away, and whether each is closed (its first
+/// point is not repeated).
+pub(crate) fn lines(path: &BezPath, tolerance: f64) -> Vec<(Vec<DVec2>, bool)> {
+    let mut lines: Vec<(Vec<DVec2>, bool)> = Vec::new();
+    kurbo::flatten(path.elements().iter().copied(), tolerance, |el| match el {
+        PathEl::MoveTo(p) => lines.push((vec![DVec2::new(p.x, p.y)], false)),
+        PathEl::LineTo(p) => {
+            if let Some(line) = lines.last_mut() {
+                line.0.push(DVec2::new(p.x, p.y));
+            }
+        }
+        PathEl::ClosePath => {
+            if let Some(line) = lines.last_mut() {
+                line.1 = true;
+            }
+        }
+        // Curves do not come out of flattening.
+        PathEl::QuadTo(..) | PathEl::CurveTo(..) => {}
+    });
+    for (points, closed) in &mut lines {
+        points.dedup();
+        *closed |= points.len() > 3 && points.first() == points.last();
+        while *closed && points.len() > 1 && points.first() == points.last() {
+            points.pop();
+        }
+    }
+    lines.retain(|(points, closed)| points.len() > if *closed { 2 } else { 1 });
+    lines
+}
+
 /// The box around a path.
 pub(super) fn box_of(path: &BezPath) -> Bounds {
     let r = kurbo::Shape::bounding_box(path);

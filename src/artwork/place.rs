@@ -7,7 +7,7 @@ use kurbo::Affine;
 use super::boolean;
 use super::{Artwork, ArtworkError, FoundLayer, Part, Placed, Shape, colour_name, curve};
 use crate::geom::DVec2;
-use crate::job::{LayerSpec, Rgb, Selector};
+use crate::job::{CourseSpec, LayerSpec, Rgb, Selector, SurfaceSpec};
 
 /// Most things that one message lists.
 const LISTED: usize = 8;
@@ -53,7 +53,11 @@ impl Artwork {
         let shapes: Vec<Shape> = self
             .shapes
             .iter()
-            .map(|s| Shape { curve: to_place * s.curve.clone(), ..s.clone() })
+            .map(|s| Shape {
+                curve: to_place * s.curve.clone(),
+                course: s.course.as_ref().map(|line| to_place * line.clone()),
+                ..s.clone()
+            })
             .collect();
         let mut taken = Vec::with_capacity(layers.len());
         for layer in layers {
@@ -65,7 +69,7 @@ impl Artwork {
             taken.push(chosen);
         }
         let mut notes = self.notes.clone();
-        notes.extend(left_over(&shapes, &taken));
+        notes.extend(left_over(&shapes, layers, &taken));
         let bounds = super::carvable_bounds(&shapes);
         Ok(Placed { shapes, layers: taken, bounds, notes })
     }
@@ -156,8 +160,20 @@ fn farness(wanted: &Selector, there: &Selector) -> (u8, i64) {
 }
 
 /// A note on the shapes that no layer takes, by paint.
-fn left_over(shapes: &[Shape], taken: &[Vec<usize>]) -> Option<String> {
-    let mut is_taken = vec![false; shapes.len()];
+fn left_over(shapes: &[Shape], layers: &[LayerSpec], taken: &[Vec<usize>]) -> Option<String> {
+    let crests = layers.iter().filter_map(|layer| match &layer.surface {
+        SurfaceSpec::Drawn(drawn) => Some(&drawn.crests),
+        _ => None,
+    });
+    let lines: Vec<&Selector> = crests
+        .flatten()
+        .filter_map(|crest| match &crest.course {
+            CourseSpec::Paths { select, .. } => Some(select),
+            CourseSpec::Points { .. } => None,
+        })
+        .collect();
+    let mut is_taken: Vec<bool> =
+        shapes.iter().map(|shape| lines.iter().any(|select| shape.is_named_by(select))).collect();
     for i in taken.iter().flatten() {
         is_taken[*i] = true;
     }

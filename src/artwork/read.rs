@@ -187,7 +187,10 @@ impl Walker<'_> {
             let tolerance = self.tolerance / stretch(scope.at);
             let outline = scope.at * stroke::outline(curve, stroke, tolerance, &name)?;
             Self::check_extent(&outline, &name)?;
+            let known = self.shapes.len();
             self.add(Part::Stroke, outline, FillRule::NonZero, color, scope, element);
+            let line = self.y_up() * (scope.at * curve.clone());
+            self.shapes[known..].iter_mut().for_each(|shape| shape.course = Some(line.clone()));
         }
         Ok(())
     }
@@ -216,6 +219,11 @@ impl Walker<'_> {
         self.shapes.push(shape);
     }
 
+    /// From the page's coordinates to those of shapes.
+    fn y_up(&self) -> Affine {
+        Affine::new([1.0, 0.0, 0.0, -1.0, 0.0, f64::from(self.page.height())])
+    }
+
     fn shape(
         &self,
         part: Part,
@@ -224,9 +232,9 @@ impl Walker<'_> {
         color: Rgb,
         element: Option<usize>,
     ) -> Shape {
-        let y_up = Affine::new([1.0, 0.0, 0.0, -1.0, 0.0, f64::from(self.page.height())]);
         let mut shape = Shape {
-            curve: y_up * curve.clone(),
+            curve: self.y_up() * curve.clone(),
+            course: None,
             rule,
             part,
             color,

@@ -5,7 +5,7 @@ use super::observe::{self, Stages};
 use super::{Stop, inputs, outcome, tables};
 use crate::CarveError;
 use crate::compare::{self, Compared, Subject, Wanted};
-use crate::job::SurfaceSpec;
+use crate::job::{LayerSpec, SurfaceSpec};
 use crate::outline;
 use crate::report::{self, SideBySide};
 use std::path::{Path, PathBuf};
@@ -101,6 +101,11 @@ pub(super) fn run(args: &Args) -> Result<(), Stop> {
         pitch_mm: args.pitch,
     };
     let subject = Subject::of(&job, &outlines, &wanted)?;
+    // Drawn crests are the job's own: there is nothing to draw elsewhere.
+    let drawn = |layer: &LayerSpec| matches!(layer.surface, SurfaceSpec::Drawn(_));
+    if args.methods.is_empty() && subject.job().layers.iter().all(drawn) {
+        methods.insert(0, "crest");
+    }
     let pictures = methods.iter().filter(|_| args.each).map(|method| format!("{method}.png"));
     let names: Vec<String> =
         ["surfaces.html", "surfaces.png"].into_iter().map(str::to_owned).chain(pictures).collect();

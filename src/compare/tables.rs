@@ -402,6 +402,6 @@ fn bevelled(shape: &Shape, grid: &Grid) -> Patch {
         visible: false,
     };
     let figure = Figure { source: layer.name.clone(), regions: vec![shape.region.clone()] };
-    let raised = raise(&figure, &layer, grid, &Tolerance::default()).expect("a sound shape");
+    let raised = raise(&figure, &layer, &[], grid, &Tolerance::default()).expect("a sound shape");
     sampled(raised.surface, &layer, &figure, grid).expect("a sound surface").0
 }

@@ -162,6 +162,8 @@ pub(super) const METHODS: &[&str] = &[
     "catmull-clark",
     "doo-sabin",
 ];
+/// The surface method over drawn ridge lines, which needs `[[layer.crest]]`.
+pub(super) const DRAWN: &str = "crest";
 /// Names of [`super::Control`], in its order.
 pub(super) const CONTROLS: &[&str] = &["even", "split", "quad4", "quad6"];
 /// Ways to smooth an outline.
@@ -223,9 +225,9 @@ const fn key(name: &'static str, kind: Kind, default: Fallback, doc: &'static st
 use Fallback::{Flag, Number, Required, Rule, Text};
 
 /// The sections of a job, in the order in which they are written out.
-pub(super) static JOB: [&Section; 13] = [
+pub(super) static JOB: [&Section; 14] = [
     &TOP, &STOCK, &ARTWORK, &TRACE, &RELIEF, &TOLERANCE, &SAFETY, &KEEP_OUT, &LAYER, &SURFACE,
-    &SMOOTH, &GROUP, &OPERATION,
+    &SMOOTH, &CREST, &GROUP, &OPERATION,
 ];
 
 /// Top level of a job.
@@ -638,6 +640,71 @@ pub(super) static LAYER: Section = Section {
             Rule("none: it joins what is below by itself"),
             "name of the [[group]] that it is merged into first",
         ),
+        key(
+            "crest",
+            Kind::Forms("[[layer.crest]] tables"),
+            Rule("none"),
+            "surface = \"crest\" only: the ridge lines, each a [[layer.crest]]",
+        ),
+    ],
+};
+
+/// `[[layer.crest]]`
+pub(super) static CREST: Section = Section {
+    name: "crest",
+    header: "[[layer.crest]]",
+    doc: "a ridge line of the layer above it, for surface = \"crest\": along paths of the artwork (select), or by points",
+    keys: &[
+        key(
+            "select",
+            Kind::Forms("\"label:...\", \"id:...\", \"stroke:#rrggbb\" or another selector"),
+            Rule("none: points must be given"),
+            "which paths, open or closed: by label, id, layer or stroke; the line in the middle of a stroke counts",
+        ),
+        key(
+            "height_mm",
+            mm(0.0, 500.0),
+            Rule("height_mm of the layer"),
+            "height of the whole crest above the background",
+        ),
+        key(
+            "heights",
+            Kind::Pairs { what: "place", low: 0.0, high: 1.0, min: 0.0, max: 500.0, unit: "mm" },
+            Rule("height_mm everywhere"),
+            "heights along the path: [[0, 2], [0.5, 6], [1, 3]], from its start to its end",
+        ),
+        key(
+            "points",
+            Kind::Forms("[[x, y, height], ...], three numbers in mm each"),
+            Rule("none: select must be given"),
+            "the crest by points: x and y in work coordinates, height above the background",
+        ),
+        key(
+            "through",
+            Kind::Flag,
+            Flag(true),
+            "points only: the crest goes through the points; false: they are control points of a NURBS curve",
+        ),
+        key("closed", Kind::Flag, Flag(false), "points only: the last point joins the first"),
+        key(
+            "weights",
+            Kind::Forms("a list of numbers above 0, one for each point"),
+            Rule("1 everywhere"),
+            "points only: weights, for circles and other conics",
+        ),
+        key(
+            "knots",
+            Kind::Forms("a list of numbers of 0 or more, one from each point to the next"),
+            Rule("roots of the points' distances; control points: 1 everywhere"),
+            "points only: knot intervals; two of 0 side by side make a kink, 0 at an end clamps it",
+        ),
+        key(
+            "half_width_mm",
+            mm(0.01, 500.0),
+            Rule("0.12 of the way to the outline"),
+            "half the width of the strip that is level across the crest",
+        ),
+        key("sharp", Kind::Flag, Flag(false), "a sharp edge in place of the strip"),
     ],
 };
 
@@ -771,20 +838,20 @@ pub(super) static SURFACE: Section = Section {
             "method",
             Kind::Forms(
                 "\"ruled\", \"ratio\", \"profile\", \"harmonic\", \"teddy\", \"r-function\", \"scan-lines\", \"patches\", \"butterfly\", \"butterfly-original\", \"loop\", \"sqrt3\", \
-                 \"catmull-clark\" or \"doo-sabin\"",
+                 \"catmull-clark\", \"doo-sabin\" or \"crest\"",
             ),
             Text("ruled"),
             "ruled: a level crest over the spine, ruled down to the outline; ratio: the same as a field; \
              profile: height by the distance to the outline; harmonic: smoother than ratio; teddy: inflated, as high \
              as it is wide; r-function: soft hips; scan-lines: by the middles of lines across; patches: parabolas without the ruled surface's \
-             care for seams; the others: subdivision of a mesh over the spine, of which only butterfly and \
+             care for seams; crest: over ridge lines that are drawn, see [[layer.crest]]; the others: subdivision of a mesh over the spine, of which only butterfly and \
              butterfly-original rise to height_mm",
         ),
         key(
             "profile",
             Kind::Choice(PROFILES),
             Text("parabola"),
-            "cross-section of the flank (all but patches and subdivision); teddy: by default round, scan-lines: bell",
+            "cross-section of the flank (all but patches and subdivision); teddy: by default round, scan-lines: bell, crest: chamfer",
         ),
         key(
             "radius_mm",
@@ -850,7 +917,7 @@ pub(super) static SURFACE: Section = Section {
             "edge_mm",
             mm(0.01, LENGTH),
             Rule("area over perimeter of each part"),
-            "edges of the triangles that the spine is found with",
+            "edges of the triangles that the spine is found with; crest: edges of the control mesh (by the area)",
         ),
         key(
             "corner_deg",

@@ -5,14 +5,15 @@ use std::ops::Range;
 use toml::de::{DeTable, DeValue};
 
 use super::colors;
+use super::crest::read_crests;
 use super::draft::{Draft, text_or_form};
 use super::error::{JobError, Source, nearest, shown};
-use super::keys::{Key, LAYER, METHODS, PROFILES, SLOPE_CAP, SURFACE, rule};
+use super::keys::{DRAWN, Key, LAYER, METHODS, PROFILES, SLOPE_CAP, SURFACE, rule};
 use super::reader::{Table, as_number};
 use super::settle::{TOUCHING_MM, round};
 use super::smooth::read_smooth;
 use super::surface::{
-    Control, CrestSpec, Join, Profile, Prune, Scheme, Significance, SkeletonSpec, Split,
+    Control, CrestSpec, DrawnSpec, Join, Profile, Prune, Scheme, Significance, SkeletonSpec, Split,
     SubdivisionSpec, SurfaceSpec,
 };
 use super::types::{Combine, Found, FoundLayer, LayerSpec, Rgb, Selector};
@@ -162,10 +163,27 @@ fn layer(table: &Table<'_>, select: Selector, name: String) -> Result<LayerDraft
         let help = "what is below is scaled by the layer's height over its height_mm";
         return Err(table.impossible("height_mm", message, "", help));
     }
+    let mut surface = read_surface(table)?;
+    let crests = read_crests(table)?;
+    match &mut surface {
+        SurfaceSpec::Drawn(drawn) if crests.is_empty() => {
+            debug_assert!(drawn.crests.is_empty(), "only this table holds them");
+            let message = "surface = \"crest\" needs ridge lines";
+            let help = "add a [[layer.crest]] below the layer: select = \"label:vein\" or points = [[x, y, height], ...]";
+            return Err(table.impossible("surface", message, "needs [[layer.crest]]", help));
+        }
+        SurfaceSpec::Drawn(drawn) => drawn.crests = crests,
+        other if !crests.is_empty() => {
+            let message = format!("method \"{}\" does not use [[layer.crest]]", other.method());
+            let help = "write surface = \"crest\" in the layer, or leave the table out";
+            return Err(table.impossible("crest", &message, "without effect", help));
+        }
+        _ => {}
+    }
     let spec = LayerSpec {
         name,
         select,
-        surface: read_surface(table)?,
+        surface,
         base_mm: table.sure_number("base_mm"),
         height_mm: height_mm.unwrap_or_default(),
         offset_mm: table.sure_number("offset_mm"),
@@ -286,6 +304,9 @@ fn uses(method: &str, key: &str) -> bool {
         "radius_mm" => method == "profile",
         "order" => method == "r-function",
         "directions" => method == "scan-lines",
+        _ if method == DRAWN => {
+            matches!(key, "profile" | "hole_base_mm" | "edge_mm" | "corner_deg")
+        }
         "width_power" if method == "teddy" => false,
         "levels" | "control" => subdivides,
         "adaptive_mm" => method == Scheme::Butterfly.name(),
@@ -301,6 +322,7 @@ fn usual_profile(method: &str) -> Profile {
     match method {
         "teddy" => Profile::Round,
         "scan-lines" => Profile::Bell,
+        DRAWN => Profile::Chamfer,
         _ => Profile::Parabola,
     }
 }
@@ -340,6 +362,7 @@ fn surface_of(table: &Table<'_>, method: &str) -> Result<SurfaceSpec, JobError> 
         "ratio" => SurfaceSpec::Ratio(crest),
         "harmonic" => SurfaceSpec::Harmonic(crest),
         "teddy" => SurfaceSpec::Teddy(CrestSpec { width_power: 1.0, ..crest }),
+        DRAWN => SurfaceSpec::Drawn(DrawnSpec { crests: Vec::new(), crest }),
         "patches" => {
             let skeleton =
                 SkeletonSpec { join: Join::Pairs, split: Split::Sleeves, ..crest.skeleton };
@@ -388,12 +411,12 @@ fn check_method(
     method: &str,
     span: Option<Range<usize>>,
 ) -> Result<(), JobError> {
-    if METHODS.contains(&method) {
+    if METHODS.contains(&method) || method == DRAWN {
         return Ok(());
     }
     let message = format!("there is no surface method {}", shown(method));
     let help = format!(
-        "there is: {}; shapes of the flank: surface = {{ method = \"ruled\", profile = \"round\" }} ({})",
+        "there is: {}, {DRAWN}; shapes of the flank: surface = {{ method = \"ruled\", profile = \"round\" }} ({})",
         METHODS.join(", "),
         PROFILES.join(", ")
     );
@@ -401,7 +424,7 @@ fn check_method(
     Err(JobError::UnknownName(layer.source.fault(Some(span), &message, "not built in", &help)))
 }
 
-fn read_selector(table: &Table<'_>, text: &str) -> Result<Selector, JobError> {
+pub(super) fn read_selector(table: &Table<'_>, text: &str) -> Result<Selector, JobError> {
     const KINDS: [&str; 6] = ["fill", "stroke", "label", "id", "layer", "all"];
     let text = text.trim();
     if text == "all" {

@@ -159,7 +159,7 @@ impl<'a> Table<'a> {
         let Some(value) = self.raw(name) else { return Ok(Vec::new()) };
         let Some(array) = value.get_ref().as_array() else {
             let message = format!("`{name}` must be written with two brackets");
-            let help = format!("write [[{name}]]: there may be several of them");
+            let help = format!("write {}: there may be several of them", section.header);
             let fault =
                 self.source.fault(Some(value.span()), &message, "not a list of tables", &help);
             return Err(JobError::WrongType(fault));
@@ -169,7 +169,7 @@ impl<'a> Table<'a> {
             .enumerate()
             .map(|(index, item)| match item.get_ref() {
                 DeValue::Table(table) => {
-                    let path = format!("{name}[{index}]");
+                    let path = format!("{}[{index}]", self.path_of(name));
                     Table::check(self.source, section, &path, item.span(), table)
                 }
                 other => Err(self.wrong_form(name, item.span(), other)),

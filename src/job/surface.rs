@@ -1,5 +1,7 @@
 //! The types of a layer's surface: its method, and how skeletons, control meshes and cross-sections are made.
 
+use super::types::Selector;
+
 /// How a layer's surface is made from its outline.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 #[serde(rename_all = "kebab-case", tag = "method")]
@@ -45,6 +47,9 @@ pub enum SurfaceSpec {
         #[serde(flatten)]
         crest: CrestSpec,
     },
+    /// A surface over ridge lines that the artwork or the job draws: `[[layer.crest]]`.
+    #[serde(rename = "crest")]
+    Drawn(DrawnSpec),
     /// A subdivision surface over a control mesh (methods A and A+).
     #[serde(untagged)]
     Subdivision(SubdivisionSpec),
@@ -60,6 +65,7 @@ impl SurfaceSpec {
             | Self::Harmonic(crest)
             | Self::Teddy(crest)
             | Self::Patches { crest, .. } => Some(crest),
+            Self::Drawn(drawn) => Some(&drawn.crest),
             Self::Subdivision(subdivision) => Some(&subdivision.crest),
         }
     }
@@ -73,6 +79,7 @@ impl SurfaceSpec {
             | Self::Harmonic(crest)
             | Self::Teddy(crest)
             | Self::Patches { crest, .. } => Some(crest),
+            Self::Drawn(drawn) => Some(&mut drawn.crest),
             Self::Subdivision(subdivision) => Some(&mut subdivision.crest),
         }
     }
@@ -88,9 +95,57 @@ impl SurfaceSpec {
             Self::RFunction { .. } => "r-function",
             Self::ScanLines { .. } => "scan-lines",
             Self::Patches { .. } => "patches",
+            Self::Drawn(_) => "crest",
             Self::Subdivision(subdivision) => subdivision.scheme.name(),
         }
     }
+}
+
+/// What a surface over drawn ridge lines is made with.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct DrawnSpec {
+    /// The ridge lines; never empty in a checked job.
+    pub crests: Vec<DrawnCrestSpec>,
+    /// Cross-section, heights of holes, corners of the outline and edges of the mesh; the rest plays no part.
+    #[serde(flatten)]
+    pub crest: CrestSpec,
+}
+
+/// A ridge line, or several alike.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct DrawnCrestSpec {
+    /// Where it runs, and how high.
+    pub course: CourseSpec,
+    /// A crease in place of a strip.
+    pub sharp: bool,
+    /// Half the width of its strip, mm; `None`: by the room there is.
+    pub half_width_mm: Option<f64>,
+}
+
+/// Where a ridge line runs, and how high.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+#[serde(untagged)]
+pub enum CourseSpec {
+    /// Along the paths of the artwork that a selector names.
+    Paths {
+        /// Names them.
+        select: Selector,
+        /// (part of the way, height in mm), parts rising; one for all; empty: the layer's `height_mm`.
+        heights: Vec<[f64; 2]>,
+    },
+    /// Through points, or by control points.
+    Points {
+        /// x, y and height, mm.
+        points: Vec<[f64; 3]>,
+        /// One for each point; empty: all 1.
+        weights: Vec<f64>,
+        /// Knot intervals; empty: by the distances of the points.
+        knots: Vec<f64>,
+        /// It ends where it starts.
+        closed: bool,
+        /// It goes through the points; else they are its control points.
+        through: bool,
+    },
 }
 
 /// What a subdivision surface is made with.

@@ -1,5 +1,6 @@
 //! Jobs that are read and settled: values, defaults, sizes. Faults and written text have files of their own.
 
+mod crests;
 mod faults;
 mod written;
 

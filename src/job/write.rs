@@ -6,13 +6,13 @@ use super::draft::Draft;
 use super::error::JobError;
 use super::group::{GroupSpec, users_of};
 use super::keys::{
-    ARTWORK, BACKGROUND, CONTROLS, CUTTER, FOLLOWS, Fallback, GROUP, JOB, JOINS, LAYER, MACHINE,
-    MILLINGS, OPERATION, ORIGINS, PATTERNS, PROFILES, PRUNES, RELIEF, SAFETY, SPLITS, STOCK,
-    SURFACE, Section, TOLERANCE, TOP, TRACE, TRACE_METHODS, WOOD, rule,
+    ARTWORK, BACKGROUND, CONTROLS, CREST, CUTTER, FOLLOWS, Fallback, GROUP, JOB, JOINS, LAYER,
+    MACHINE, MILLINGS, OPERATION, ORIGINS, PATTERNS, PROFILES, PRUNES, RELIEF, SAFETY, SPLITS,
+    STOCK, SURFACE, Section, TOLERANCE, TOP, TRACE, TRACE_METHODS, WOOD, rule,
 };
 use super::library::Library;
 use super::smooth::smooth_lines;
-use super::surface::{Prune, SkeletonSpec, SurfaceSpec};
+use super::surface::{CourseSpec, DrawnCrestSpec, DrawnSpec, Prune, SkeletonSpec, SurfaceSpec};
 use super::types::{
     Backdrop, Background, Connectivity, CutterShape, CutterSpec, Fit, Found, Job, LayerSpec,
     Machine, Milling, Operation, OperationKind, Origin, Pattern, Place, Stepover, TraceSpec,
@@ -63,6 +63,11 @@ impl Job {
             let group = self.groups.iter().find(|group| group.layers.contains(&index));
             lines.extend(group.map(|group| ("group", quoted(&group.name))));
             section("[[layer]]", &lines);
+            if let SurfaceSpec::Drawn(drawn) = &layer.surface {
+                for crest in &drawn.crests {
+                    section(CREST.header, &crest_lines(crest));
+                }
+            }
         }
         for group in &self.groups {
             section("[[group]]", &group_lines(group));
@@ -380,7 +385,8 @@ fn surface_lines(surface: &SurfaceSpec, of_picture: bool) -> Vec<Line> {
         | SurfaceSpec::Ratio(crest)
         | SurfaceSpec::Harmonic(crest)
         | SurfaceSpec::Teddy(crest)
-        | SurfaceSpec::Patches { crest, .. } => crest,
+        | SurfaceSpec::Patches { crest, .. }
+        | SurfaceSpec::Drawn(DrawnSpec { crest, .. }) => crest,
         SurfaceSpec::Subdivision(subdivision) => &subdivision.crest,
     };
     let mut lines = vec![("method", quoted(surface.method()))];
@@ -394,6 +400,12 @@ fn surface_lines(surface: &SurfaceSpec, of_picture: bool) -> Vec<Line> {
             lines.push(("control", quoted(CONTROLS[own.control as usize])));
         }
         _ => lines.push(("profile", quoted(PROFILES[crest.profile as usize]))),
+    }
+    if let SurfaceSpec::Drawn(_) = surface {
+        lines.extend(crest.hole_base_mm.map(|base| ("hole_base_mm", number(base))));
+        lines.extend(crest.skeleton.edge_mm.map(|edge| ("edge_mm", number(edge))));
+        lines.push(("corner_deg", degrees(crest.skeleton.corner_rad)));
+        return lines;
     }
     // What differs from the defaults; the rest would bury it.
     let (plain, own) = (SkeletonSpec::default(), &crest.skeleton);
@@ -425,6 +437,39 @@ fn surface_lines(surface: &SurfaceSpec, of_picture: bool) -> Vec<Line> {
     // Layers of pictures have one by default.
     let significance = own.significance.map(|s| s.rel).or_else(|| of_picture.then_some(0.0));
     lines.extend(significance.map(|rel| ("significance", number(rel))));
+    lines
+}
+
+fn crest_lines(crest: &DrawnCrestSpec) -> Vec<Line> {
+    let list = |numbers: &[f64]| {
+        format!("[{}]", numbers.iter().map(|n| number(*n)).collect::<Vec<_>>().join(", "))
+    };
+    let rows = |rows: &mut dyn Iterator<Item = String>| {
+        format!("[{}]", rows.collect::<Vec<_>>().join(", "))
+    };
+    let mut lines = match &crest.course {
+        CourseSpec::Paths { select, heights } => {
+            let mut lines = vec![("select", quoted(&select.to_string()))];
+            if !heights.is_empty() {
+                lines.push(("heights", rows(&mut heights.iter().map(|h| list(h)))));
+            }
+            lines
+        }
+        CourseSpec::Points { points, weights, knots, closed, through } => {
+            let mut lines = vec![
+                ("points", rows(&mut points.iter().map(|p| list(p)))),
+                ("through", through.to_string()),
+                ("closed", closed.to_string()),
+            ];
+            let lists = [("weights", weights), ("knots", knots)];
+            let lists = lists.into_iter().filter(|(_, numbers)| !numbers.is_empty());
+            lines.extend(lists.map(|(name, numbers)| (name, list(numbers))));
+            lines
+        }
+    };
+    lines.extend(crest.half_width_mm.map(|mm| ("half_width_mm", number(mm))));
+    lines.push(("sharp", crest.sharp.to_string()));
+    debug_assert!(lines.iter().all(|(name, _)| CREST.key(name).is_some()));
     lines
 }
 

@@ -298,6 +298,7 @@ fn notes_stay_few_however_many_paths_there_are() {
 fn shape_of(curve: kurbo::BezPath) -> Placed {
     let shape = Shape {
         curve,
+        course: None,
         rule: FillRule::EvenOdd,
         part: Part::Fill,
         color: Rgb(0, 0, 0),

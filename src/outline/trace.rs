@@ -7,12 +7,12 @@ use rayon::prelude::*;
 use super::notes::{self, Change, Gone, NewCrossings};
 use super::regions::{self, Built};
 use super::smooth::{Junctions, Smoothed, Smoother};
-use super::{Figure, OutlineError, OutlineLayer, Outlines};
+use super::{Figure, OutlineError, OutlineLayer, Outlines, RidgePath};
 use crate::artwork::boolean::{self, FixedGrid, NodeRing};
 use crate::artwork::{FillRule, Part, Placed, Shape, curve};
 use crate::geom::edge_grid::EdgeGrid;
 use crate::geom::{DVec2, Tolerance, bounds_of};
-use crate::job::LayerSpec;
+use crate::job::{CourseSpec, LayerSpec, SurfaceSpec};
 
 /// Most chords that one shape is flattened into.
 const MAX_CHORDS: usize = 4_000_000;
@@ -44,7 +44,8 @@ pub fn trace(
     let tracer = Tracer::new(placed, layers, chord_mm)?;
     let mut out = Outlines { layers: Vec::with_capacity(layers.len()), notes: Vec::new() };
     for (index, (layer, indices)) in layers.iter().zip(&placed.layers).enumerate() {
-        let (traced, notes) = tracer.layer(index, layer, indices)?;
+        let (mut traced, notes) = tracer.layer(index, layer, indices)?;
+        traced.ridges = ridges(placed, layer, chord_mm)?;
         out.layers.push(traced);
         out.notes.extend(notes);
     }
@@ -57,6 +58,53 @@ pub fn trace(
         "every region keeps its laws"
     );
     Ok(out)
+}
+
+/// The paths that the crests of a layer run along: open ones, the middles of strokes, and the outlines of fills where
+/// nothing else has the name.
+fn ridges(
+    placed: &Placed,
+    layer: &LayerSpec,
+    chord_mm: f64,
+) -> Result<Vec<RidgePath>, OutlineError> {
+    const LISTED: usize = 12;
+    let SurfaceSpec::Drawn(drawn) = &layer.surface else { return Ok(Vec::new()) };
+    let mut ridges = Vec::new();
+    for (crest, spec) in drawn.crests.iter().enumerate() {
+        let CourseSpec::Paths { select, .. } = &spec.course else { continue };
+        let mut named: Vec<&Shape> =
+            placed.shapes.iter().filter(|s| s.is_named_by(select)).collect();
+        if named.iter().any(|s| s.part != Part::Fill) {
+            named.retain(|s| s.part != Part::Fill);
+        }
+        let known = ridges.len();
+        for shape in named {
+            let line = shape.course.as_ref().unwrap_or(&shape.curve);
+            for (points, closed) in curve::lines(line, chord_mm * FLATTEN_PER_CHORD) {
+                ridges.push(RidgePath { crest, source: shape.source.clone(), points, closed });
+            }
+        }
+        if ridges.len() == known {
+            let lines = placed.shapes.iter().filter(|s| s.part != Part::Fill);
+            let mut there: Vec<String> = lines
+                .flat_map(|s| {
+                    let labels = s.labels.iter().map(|l| format!("\"label:{l}\""));
+                    labels.chain(s.ids.iter().map(|id| format!("\"id:{id}\""))).collect::<Vec<_>>()
+                })
+                .collect();
+            there.sort_unstable();
+            there.dedup();
+            there.truncate(LISTED);
+            let there_is = if there.is_empty() {
+                "no line with a name: give the path a label or an id".to_owned()
+            } else {
+                there.join(", ")
+            };
+            let (layer, select) = (layer.name.clone(), select.clone());
+            return Err(OutlineError::NoCrestPath { layer, crest: crest + 1, select, there_is });
+        }
+    }
+    Ok(ridges)
 }
 
 /// Which version of a shape: its index, and the layer whose `smooth_outline` it has; `None` as drawn.
@@ -213,7 +261,8 @@ impl<'a> Tracer<'a> {
                 if notes.is_empty() { "no shape is in it".to_owned() } else { notes.join("; ") };
             return Err(OutlineError::EmptyLayer { layer: layer.name.clone(), why });
         }
-        Ok((OutlineLayer { name: layer.name.clone(), figures }, notes))
+        let ridges = Vec::new();
+        Ok((OutlineLayer { name: layer.name.clone(), figures, ridges }, notes))
     }
 
     fn figure(

@@ -104,6 +104,7 @@ fn outlines(layers: Vec<Vec<Ring>>) -> Outlines {
     let layer = |rings: Vec<Ring>| OutlineLayer {
         name: "layer".into(),
         figures: rings.into_iter().map(figure).collect(),
+        ridges: vec![],
     };
     Outlines { layers: layers.into_iter().map(layer).collect(), notes: vec![] }
 }

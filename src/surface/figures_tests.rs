@@ -274,7 +274,7 @@ pub(super) fn raise_region(
     surface: SurfaceSpec,
 ) -> (Vec<Vec<Surface>>, Vec<String>) {
     let figure = Figure { source: "path 'p'".into(), regions: vec![region] };
-    let layer = OutlineLayer { name: "layer".into(), figures: vec![figure] };
+    let layer = OutlineLayer { name: "layer".into(), figures: vec![figure], ridges: vec![] };
     let outlines = Outlines { layers: vec![layer], notes: vec![] };
     let spec = LayerSpec {
         name: "layer".into(),

@@ -153,6 +153,25 @@ impl Mesh {
         None
     }
 
+    /// Takes the triangles that are turned over seen from above out into a mesh of their own, turned back, each with
+    /// vertices of its own.
+    pub(super) fn take_folds(&mut self) -> Self {
+        let mut folds = Self::default();
+        let turned = |face: &[u32; 3]| {
+            let [a, b, c] = face.map(|v| self.plan(v));
+            orient(a, b, c) < 0.0
+        };
+        let (over, upright): (Vec<[u32; 3]>, Vec<[u32; 3]>) =
+            self.faces.iter().copied().partition(turned);
+        for [a, b, c] in over {
+            let first = folds.vertices.len() as u32;
+            folds.vertices.extend([a, c, b].map(|v| self.vertices[v as usize]));
+            folds.faces.push([first, first + 1, first + 2]);
+        }
+        self.faces = upright;
+        folds
+    }
+
     /// A vertex seen from above.
     fn plan(&self, v: u32) -> DVec2 {
         self.vertices[v as usize].truncate()
@@ -275,6 +294,17 @@ mod tests {
         let mut m = two_triangles();
         m.vertices[1] = DVec3::new(0.0, 3.0, 0.0);
         assert_eq!(m.unfold(), None);
+    }
+
+    #[test]
+    fn folds_are_taken_out_and_turned_back() {
+        let mut m = two_triangles();
+        assert!(m.take_folds().faces.is_empty());
+        m.vertices[1] = DVec3::new(-1.0, 3.0, 1.0);
+        assert!(m.check().is_err());
+        let folds = m.take_folds();
+        assert_eq!((m.faces.len(), folds.faces.len()), (1, 1));
+        assert_eq!((m.check(), folds.check()), (Ok(()), Ok(())));
     }
 
     #[test]

@@ -37,6 +37,7 @@ fn rank(remark: &Remark) -> (usize, f64) {
         Remark::Unfolded { part } => (8, -part),
         Remark::RidgeBelowBase => (9, 0.0),
         Remark::Rough { ripples, .. } => (10, -(ripples as f64)),
+        Remark::Folded { count, .. } => (11, -(count as f64)),
     }
 }
 
@@ -101,6 +102,11 @@ impl Worst<'_> {
             Remark::RidgeBelowBase => format!(
                 "height_mm = {height_mm} lies below base_mm = {}; the layer is flat at base_mm",
                 layer.base_mm
+            ),
+            Remark::Folded { count, at } => format!(
+                "the surface of {n} part(s) folds over itself, seen from above, in up to {count} small triangles ({}); the \
+                 highest part counts there; a smaller half_width_mm or surface.edge_mm straightens it",
+                place(at)
             ),
             Remark::Rough { ripples, length_mm, at } => format!(
                 "the outline of {n} part(s) is rough, and its ripples end up in the crest; the worst has {ripples} of \

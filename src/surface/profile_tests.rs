@@ -38,7 +38,7 @@ fn disc(n: u32, r: f64) -> Ring {
 }
 
 fn heights(figure: &Figure, layer: &LayerSpec, grid: &Grid) -> Patch {
-    match raise_figure(figure, layer, grid, &Tolerance::default()).unwrap().surface {
+    match raise_figure(figure, layer, &[], grid, &Tolerance::default()).unwrap().surface {
         Surface::Field(patch) => patch,
         _ => panic!("the profile gives a field"),
     }
@@ -116,7 +116,7 @@ fn the_cap_is_the_slope_of_a_narrow_flank() {
     let figure = figure(vec![(rectangle(0.0, 0.0, 20.0, 1.0), vec![])]);
     let grid = Grid::covering(DVec2::ZERO, 20.0, 1.0, 0.05).unwrap();
     let layer = LayerSpec { slope_cap: 4.0, ..layer(0.0, 10.0, Profile::Parabola, None) };
-    let raised = raise_figure(&figure, &layer, &grid, &Tolerance::default()).unwrap();
+    let raised = raise_figure(&figure, &layer, &[], &grid, &Tolerance::default()).unwrap();
     assert!(
         matches!(raised.remarks[..], [Remark::Capped { height_mm }] if (height_mm - 1.0).abs() < 1e-3)
     );
@@ -210,11 +210,11 @@ fn narrow_figures_are_averaged_and_told() {
     let strip = |width: f64| figure(vec![(rectangle(2.0, 5.1, 16.0, width), vec![])]);
     let flat = layer(1.0, 1.0, Profile::Chamfer, None);
 
-    let raised = raise_figure(&strip(1.0), &flat, &grid, &Tolerance::default()).unwrap();
+    let raised = raise_figure(&strip(1.0), &flat, &[], &grid, &Tolerance::default()).unwrap();
     assert!(matches!(raised.remarks[..], [Remark::Narrow { .. }]));
 
     // 0.2 mm on a grid of 0.5 mm: the only row of samples inside is at 5.1875 and belongs to row 10.
-    let raised = raise_figure(&strip(0.2), &flat, &grid, &Tolerance::default()).unwrap();
+    let raised = raise_figure(&strip(0.2), &flat, &[], &grid, &Tolerance::default()).unwrap();
     assert!(matches!(raised.remarks[..], [Remark::TooNarrow { .. }]));
     let Surface::Field(z) = raised.surface else { panic!() };
     assert_eq!(z.at(20, 10), 1.0);
@@ -224,7 +224,7 @@ fn narrow_figures_are_averaged_and_told() {
     // Cell of row 10: samples at y = 4.8125, 4.9375 (outside), 5.0625 (outside), 5.1875.
     let ridge = layer(0.0, 1.0, Profile::Chamfer, Some(0.5));
     let Surface::Field(z) =
-        raise_figure(&strip(1.0), &ridge, &grid, &Tolerance::default()).unwrap().surface
+        raise_figure(&strip(1.0), &ridge, &[], &grid, &Tolerance::default()).unwrap().surface
     else {
         panic!()
     };
@@ -239,8 +239,12 @@ fn all_figures_come_in_order_with_their_notes() {
     let off = figure(vec![(rectangle(12.0, 1.0, 18.0, 8.0), vec![])]);
     let outlines = Outlines {
         layers: vec![
-            OutlineLayer { name: "petals".into(), figures: vec![wide.clone(), thin] },
-            OutlineLayer { name: "leaf".into(), figures: vec![off] },
+            OutlineLayer {
+                name: "petals".into(),
+                figures: vec![wide.clone(), thin],
+                ridges: vec![],
+            },
+            OutlineLayer { name: "leaf".into(), figures: vec![off], ridges: vec![] },
         ],
         notes: vec![],
     };
@@ -270,7 +274,7 @@ fn numbers_that_are_none_are_refused() {
     let good = figure(vec![(rectangle(1.0, 1.0, 2.0, 2.0), vec![])]);
     let bad = figure(vec![(vec![DVec2::ZERO, DVec2::NAN, DVec2::ONE], vec![])]);
     let spec = layer(0.0, 1.0, Profile::Chamfer, None);
-    let fault = raise_figure(&bad, &spec, &grid, &Tolerance::default()).unwrap_err();
+    let fault = raise_figure(&bad, &spec, &[], &grid, &Tolerance::default()).unwrap_err();
     assert!(matches!(fault, SurfaceError::NotFinite { .. }));
     assert!(fault.to_string().contains("path 'p1'"));
     for spec in [
@@ -279,7 +283,7 @@ fn numbers_that_are_none_are_refused() {
         LayerSpec { draft_rad: 1.6, ..spec.clone() },
         layer(0.0, 1.0, Profile::Chamfer, Some(0.0)),
     ] {
-        let fault = raise_figure(&good, &spec, &grid, &Tolerance::default()).unwrap_err();
+        let fault = raise_figure(&good, &spec, &[], &grid, &Tolerance::default()).unwrap_err();
         assert!(matches!(fault, SurfaceError::BadSetting { .. }), "{fault}");
     }
 }
@@ -288,9 +292,14 @@ fn numbers_that_are_none_are_refused() {
 fn a_figure_off_the_grid_raises_nothing_but_a_remark() {
     let grid = Grid::covering(DVec2::ZERO, 4.0, 4.0, 0.5).unwrap();
     let off = figure(vec![(rectangle(10.0, 1.0, 2.0, 2.0), vec![])]);
-    let raised =
-        raise_figure(&off, &layer(0.0, 1.0, Profile::Chamfer, None), &grid, &Tolerance::default())
-            .unwrap();
+    let raised = raise_figure(
+        &off,
+        &layer(0.0, 1.0, Profile::Chamfer, None),
+        &[],
+        &grid,
+        &Tolerance::default(),
+    )
+    .unwrap();
     assert!(matches!(raised.remarks[..], [Remark::OverTheEdge { by_mm }] if by_mm == 8.0));
     let Surface::Field(z) = raised.surface else { panic!() };
     assert!(z.z.iter().all(|z| z.is_nan()));

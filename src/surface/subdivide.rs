@@ -10,12 +10,22 @@
 mod adaptive;
 mod butterfly;
 mod catmull_clark;
+mod closed_form;
 mod doo_sabin;
+mod evaluate;
+mod iso;
 mod loop_scheme;
+mod masks;
+mod spaced;
 mod sqrt3;
 mod topology;
 
 pub use adaptive::adaptive;
+pub use closed_form::ClosedForm;
+pub use evaluate::{EvaluateError, LimitSurface, Sample};
+pub use iso::{IsoFault, iso_line};
+pub use masks::{LimitRows, limit_rows};
+pub use spaced::SpacedMesh;
 pub use topology::Topology;
 
 use super::Mesh;
@@ -149,6 +159,24 @@ pub enum SubdivideError {
         face: usize,
         /// Number of its sides.
         sides: usize,
+    },
+    /// A knot spacing that is negative or no number.
+    #[error(
+        "the knot spacing {spacing} at {at:.2} cannot be used; give a number that is not negative"
+    )]
+    Spacing {
+        /// A vertex of its edge, mm.
+        at: DVec2,
+        /// What was given.
+        spacing: f64,
+    },
+    /// A weight that is not above 0.
+    #[error("the weight {weight} of vertex {vertex} cannot be used; give a number above 0")]
+    Weight {
+        /// Index of the vertex.
+        vertex: usize,
+        /// What was given.
+        weight: f64,
     },
     /// The mesh would get too large.
     #[error("the mesh would get {faces} faces, the limit is {MOST_FACES}; ask for fewer levels")]

@@ -480,7 +480,7 @@ fn boundaries_and_keep_outs_are_kept() {
     let corner = [[8.0, 6.0], [24.0, 6.0], [24.0, 16.0], [8.0, 16.0]];
     let outer = corner.map(DVec2::from).to_vec();
     let figure = Figure { source: "square".into(), regions: vec![Region { outer, holes: vec![] }] };
-    let layer = OutlineLayer { name: "square".into(), figures: vec![figure] };
+    let layer = OutlineLayer { name: "square".into(), figures: vec![figure], ridges: vec![] };
     let outlines = Outlines { layers: vec![layer], notes: Vec::new() };
     let margin_mm = 1.0;
     let mut operations = vec![

@@ -223,6 +223,7 @@ impl Patch {
         let (x, y) = (self.first.0, height as i32 - 1 - self.first.1);
         Shape {
             curve,
+            course: None,
             rule: FillRule::EvenOdd,
             part: Part::Fill,
             color: self.color,
