@@ -55,7 +55,7 @@ enum Command {
     /// Compare all surface methods over artwork: pictures, cross-sections and figures side by side
     Surfaces(surfaces::Args),
     /// Dry run of any programs: what they cut, what they miss, what they would break
-    Simulate(simulate::Args),
+    Simulate(Box<simulate::Args>),
     /// Tell how long a program takes on a machine, by GRBL's own planner
     Time(time::Args),
     /// Send a program to a GRBL router, a network controller or the simulation, and watch over it
