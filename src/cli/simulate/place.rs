@@ -6,7 +6,7 @@ use crate::cli::{Stop, files, inputs, outcome};
 use crate::cutter::Profile;
 use crate::gcode::read::{self, Frame, Program, Start};
 use crate::geom::{Bounds, DVec2, DVec3, Grid, Heightfield, Tolerance};
-use crate::heights::{self, Given};
+use crate::heights::{self, Given, HeightsError};
 use crate::job::{CutterSpec, Job, Library, Machine, Operation, Origin, Stock, Wood};
 use crate::proof::{Manners, Part, Setup};
 use crate::relief::Grounds;
@@ -371,8 +371,13 @@ fn target(
         width_mm: args.target_width.unwrap_or(stock.width_mm),
         origin: stock.bounds().min,
     });
-    let read = heights::read(&files::read(path)?, given, grid, 0.0)
-        .with_context(|| path.display().to_string())?;
+    let read = heights::read(&files::read(path)?, given, grid, 0.0).map_err(|e| {
+        let cure = match e {
+            HeightsError::NoScale { .. } => " (--target-z BLACK,WHITE --target-width MM)",
+            _ => "",
+        };
+        anyhow!("{}: {e}{cure}", path.display())
+    })?;
     notes.extend(read.notes);
     Ok(read.field)
 }
