@@ -1,8 +1,9 @@
 //! Constrained Delaunay triangulation of a resampled region, its inside, and the classes T, S, J.
 
 use super::{Sampled, SkeletonError};
+use crate::geom::DVec2;
 use spade::{ConstrainedDelaunayTriangulation, Point2, Triangulation as _};
-use std::collections::VecDeque;
+use std::collections::{HashMap, VecDeque};
 
 /// In [`Triangulation::neighbours`]: the edge lies on the outline.
 pub const NO_TRIANGLE: u32 = u32::MAX;
@@ -114,33 +115,86 @@ pub fn triangulate(sampled: &Sampled) -> Result<Triangulation, SkeletonError> {
         }
     }
 
-    // Triangles in ascending order of their vertices, so that nothing hangs on spade's numbering.
-    let mut kept: Vec<([u32; 3], usize)> = Vec::with_capacity(n);
-    for face in cdt.inner_faces().filter(|f| inside[f.index()] == 1) {
-        let v = face.vertices().map(|v| v.index() as u32);
-        let low = (0..3).min_by_key(|&k| v[k]).unwrap_or(0);
-        kept.push(([v[low], v[(low + 1) % 3], v[(low + 2) % 3]], face.index()));
-    }
-    kept.sort_unstable();
-    let mut number = vec![NO_TRIANGLE; cdt.num_all_faces()];
-    for (k, &(_, face)) in kept.iter().enumerate() {
-        number[face] = k as u32;
-    }
-    let mut neighbours = vec![[NO_TRIANGLE; 3]; kept.len()];
-    for face in cdt.inner_faces().filter(|f| inside[f.index()] == 1) {
-        let k = number[face.index()] as usize;
-        for edge in face.adjacent_edges().iter().filter(|e| !e.is_constraint_edge()) {
-            let from = edge.from().index() as u32;
-            let side = kept[k].0.iter().position(|&v| v == from).unwrap_or(0);
-            neighbours[k][side] = number[edge.rev().face().index()];
-        }
-    }
-    let triangulation =
-        Triangulation { triangles: kept.into_iter().map(|(v, _)| v).collect(), neighbours };
+    let mut triangles: Vec<[u32; 3]> = (cdt.inner_faces())
+        .filter(|f| inside[f.index()] == 1)
+        .map(|f| lowest_first(f.vertices().map(|v| v.index() as u32)))
+        .collect();
+    // In ascending order, so that nothing hangs on spade's numbering.
+    triangles.sort_unstable();
+    settle_ties(&mut triangles, sampled);
+    triangles.sort_unstable();
+    let sides = sides(&triangles);
+    let neighbours = (triangles.iter())
+        .map(|v| {
+            [0, 1, 2].map(|k| sides.get(&[v[(k + 1) % 3], v[k]]).copied().unwrap_or(NO_TRIANGLE))
+        })
+        .collect();
+    let triangulation = Triangulation { triangles, neighbours };
     if !triangulation.identities_hold(n, sampled.start.len() - 2) {
         return Err(SkeletonError::Disconnected { at: sampled.points[0] });
     }
     Ok(triangulation)
+}
+
+/// The same triangle, from its lowest vertex on.
+fn lowest_first(v: [u32; 3]) -> [u32; 3] {
+    let low = (0..3).min_by_key(|&k| v[k]).unwrap_or(0);
+    [v[low], v[(low + 1) % 3], v[(low + 2) % 3]]
+}
+
+/// Which triangle has an edge, by its ends in the order that it runs round. Only ever asked for a key.
+fn sides(triangles: &[[u32; 3]]) -> HashMap<[u32; 2], u32> {
+    (triangles.iter().enumerate())
+        .flat_map(|(t, v)| (0..3).map(move |k| ([v[k], v[(k + 1) % 3]], t as u32)))
+        .collect()
+}
+
+/// Where four vertices lie on a circle, both diagonals are Delaunay's. Between two edges of the outline that face
+/// each other the one is taken that joins their starts:
+///
+/// ```text
+///    w---v        w---v     Along a limb with parallel sides every vertex then has two inner edges, so that control
+///    |  /|   ->   |\  |     meshes are as regular as they can be; and nothing hangs on the order of the vertices.
+///    |/  |        |  \|     (The sides w u and x v lie on the outline.)
+///    u---x        u---x
+/// ```
+/// Each triangle stays a sleeve.
+fn settle_ties(triangles: &mut [[u32; 3]], sampled: &Sampled) {
+    let mut sides = sides(triangles);
+    let outline = |a: u32, b: u32| sampled.next(a) == b;
+    for t in 0..triangles.len() {
+        for k in 0..3 {
+            let [u, v, w] = [0, 1, 2].map(|j| triangles[t][(k + j) % 3]);
+            let Some(&other) = sides.get(&[v, u]) else { continue };
+            let Some(x) = triangles[other as usize].into_iter().find(|&p| p != u && p != v) else {
+                continue;
+            };
+            let inner = |a: u32, b: u32| !outline(a, b);
+            let facing = outline(w, u) && outline(x, v) && inner(v, w) && inner(u, x);
+            if !facing || !on_a_circle([u, x, v, w].map(|p| sampled.at(p))) {
+                continue;
+            }
+            for (into, tri) in [(t as u32, [w, u, x]), (other, [x, v, w])] {
+                triangles[into as usize] = lowest_first(tri);
+                for j in 0..3 {
+                    sides.insert([tri[j], tri[(j + 1) % 3]], into);
+                }
+            }
+            sides.remove(&[u, v]);
+            sides.remove(&[v, u]);
+            break;
+        }
+    }
+}
+
+/// Whether a quadrilateral's opposite angles add up to half a turn, within a millionth.
+fn on_a_circle([a, b, c, d]: [DVec2; 4]) -> bool {
+    let angle = |at: DVec2, p: DVec2, q: DVec2| {
+        let (p, q) = (p - at, q - at);
+        DVec2::new(p.dot(q), p.perp_dot(q)).normalize_or_zero()
+    };
+    let (one, other) = (angle(b, c, a), angle(d, a, c));
+    (one.x * other.y + one.y * other.x).abs() <= 1e-6
 }
 
 #[cfg(test)]
@@ -220,6 +274,26 @@ mod tests {
                 let t = triangulate(&s).unwrap();
                 assert_eq!(t.counts(), counts);
                 assert!(t.identities_hold(s.len(), rings.len() - 1));
+            }
+        }
+    }
+
+    /// Two rows of vertices opposite one another: every rectangle between them has two diagonals to choose from.
+    #[test]
+    fn a_band_with_parallel_sides_is_regular_whichever_way_it_lies() {
+        for turn in 0..12 {
+            let (s, c) = libm::sincos(f64::from(turn) * 0.523_6);
+            let lower = (0..=20).map(|k| (f64::from(k), 0.0));
+            let upper = (0..=20).rev().map(|k| (f64::from(k), 1.5));
+            let ring: Vec<_> = (lower.chain(upper))
+                .map(|(x, y)| crate::geom::DVec2::new(c * x - s * y, s * x + c * y))
+                .collect();
+            let sampled = sampled(&[ring]);
+            let t = triangulate(&sampled).unwrap();
+            assert!(t.identities_hold(42, 0));
+            for v in 2..19 {
+                let inner = (t.triangles.iter().flatten()).filter(|&&p| p == v).count() - 1;
+                assert_eq!(inner, 2, "vertex {v} after turn {turn}");
             }
         }
     }
