@@ -4,12 +4,14 @@
 //! are those above the layer's reference plane; what lies below, offsets and seams are the merge's work.
 //! Whatever cannot be raised as asked for is told in [`Raised::notes`], never dropped in silence.
 
+mod calm;
 mod control;
 mod crest;
 mod crested;
 mod distance;
 mod drawn;
 mod fields;
+mod halfplanes;
 mod harmonic;
 mod inscribed;
 mod inside;
@@ -34,6 +36,7 @@ pub use drawn::{
     Control, Course, CrestFault, DrawnCrest, DrawnSettings, control_over, drawn_path, drawn_surface,
 };
 pub use fields::{Rise, r_function, scan_lines};
+pub use halfplanes::{r_conjunction, r_disjunction};
 pub use inscribed::inscribed_radius;
 pub use inside::inside_spans;
 pub use literal::{Over, patches};
@@ -48,8 +51,9 @@ pub use ridge::{Heights, Ridge};
 pub use ruled::{Density, RuledFault, check as check_ruled, mesh as ruled_mesh};
 pub use rungs::{Rungs, rungs};
 pub use subdivide::{
-    ClosedForm, EvaluateError, IsoFault, LimitRows, LimitSurface, MOST_FACES, PolyMesh, Sample,
-    SpacedMesh, SubdivideError, Topology, adaptive, iso_line, limit, limit_rows, subdivide,
+    ClosedForm, CoonsMesh, CoonsRules, EvaluateError, Handle, IsoFault, LimitRows, LimitSurface,
+    MOST_FACES, PolyMesh, Sample, SpacedMesh, SubdivideError, Topology, adaptive, coons, iso_line,
+    limit, limit_rows, subdivide,
 };
 
 use crate::geom::{Bounds, Grid, Tolerance};
@@ -157,6 +161,8 @@ pub enum Remark {
         length_mm: f64,
         /// The middle of its bounding box, mm.
         at: crate::geom::DVec2,
+        /// Its crest is that of a smoothed copy, and its surface the ratio field.
+        calmed: bool,
     },
     /// An approximating scheme draws the outline in: this part of the figure is covered, the rest lies at the base.
     DrawnIn {

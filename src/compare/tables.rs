@@ -221,12 +221,13 @@ pub enum Method {
 
 impl Method {
     /// All of them.
-    pub const ALL: [Self; 18] = [
+    pub const ALL: [Self; 19] = [
         Self::Ruled,
         Self::Capped,
         Self::Ratio,
         Self::Literal,
         Self::Subdivided(Scheme::Butterfly, Control::Split),
+        Self::Subdivided(Scheme::ButterflyRay, Control::Split),
         Self::Subdivided(Scheme::Butterfly, Control::Quad4),
         Self::Subdivided(Scheme::Butterfly, Control::Quad6),
         Self::Subdivided(Scheme::Butterfly, Control::Even),
@@ -297,12 +298,18 @@ impl Method {
                 Scheme::Butterfly | Scheme::ButterflyOriginal => {
                     [0.0801, 0.2519, 0.0918, 0.0038, 0.097, 1.151, 5.29, 133.6, 17.5]
                 }
+                // The page's rows of the butterfly are those of the mesh that is split.
+                Scheme::ButterflyRay => {
+                    [0.0649, 0.2673, 0.0789, 0.0037, 0.140, 1.137, 6.12, 407.0, 25.7]
+                }
                 Scheme::Loop => [0.2729, 0.3418, 0.2726, 0.2752, 0.362, 1.0, 2.88, 12.1, 5.9],
                 Scheme::Sqrt3 => [0.2706, 0.3395, 0.2694, 0.2744, 0.359, 1.0, 2.85, 9.8, 5.6],
                 Scheme::CatmullClark => {
                     [0.2412, 0.3156, 0.2405, 0.2434, 0.307, 1.0, 2.94, 31.7, 12.1]
                 }
                 Scheme::DooSabin => [0.2090, 0.2751, 0.2090, 0.2095, 0.253, 1.0, 3.0, 43.2, 13.9],
+                // Not tabled: they have no row.
+                Scheme::Kobbelt | Scheme::Coons => return [None; 9],
             },
         };
         let mut row = row.map(Some);

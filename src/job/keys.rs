@@ -157,15 +157,18 @@ pub(super) const METHODS: &[&str] = &[
     "patches",
     "butterfly",
     "butterfly-original",
+    "butterfly-ray",
     "loop",
     "sqrt3",
     "catmull-clark",
     "doo-sabin",
+    "kobbelt",
+    "coons",
 ];
 /// The surface method over drawn ridge lines, which needs `[[layer.crest]]`.
 pub(super) const DRAWN: &str = "crest";
 /// Names of [`super::Control`], in its order.
-pub(super) const CONTROLS: &[&str] = &["even", "split", "quad4", "quad6"];
+pub(super) const CONTROLS: &[&str] = &["even", "split", "quad4", "quad6", "quads"];
 /// Ways to smooth an outline.
 pub(super) const SMOOTHINGS: &[&str] = &[
     "chaikin",
@@ -837,15 +840,15 @@ pub(super) static SURFACE: Section = Section {
         key(
             "method",
             Kind::Forms(
-                "\"ruled\", \"ratio\", \"profile\", \"harmonic\", \"teddy\", \"r-function\", \"scan-lines\", \"patches\", \"butterfly\", \"butterfly-original\", \"loop\", \"sqrt3\", \
-                 \"catmull-clark\", \"doo-sabin\" or \"crest\"",
+                "\"ruled\", \"ratio\", \"profile\", \"harmonic\", \"teddy\", \"r-function\", \"scan-lines\", \"patches\", \"butterfly\", \"butterfly-original\", \"butterfly-ray\", \"loop\", \"sqrt3\", \
+                 \"catmull-clark\", \"doo-sabin\", \"kobbelt\", \"coons\" or \"crest\"",
             ),
             Text("ruled"),
             "ruled: a level crest over the spine, ruled down to the outline; ratio: the same as a field; \
              profile: height by the distance to the outline; harmonic: smoother than ratio; teddy: inflated, as high \
              as it is wide; r-function: soft hips; scan-lines: by the middles of lines across; patches: parabolas without the ruled surface's \
-             care for seams; crest: over ridge lines that are drawn, see [[layer.crest]]; the others: subdivision of a mesh over the spine, of which only butterfly and \
-             butterfly-original rise to height_mm",
+             care for seams; crest: over ridge lines that are drawn, see [[layer.crest]]; the others: subdivision of a mesh over the spine, of which loop, sqrt3, \
+             catmull-clark and doo-sabin stay below height_mm",
         ),
         key(
             "profile",
@@ -861,9 +864,9 @@ pub(super) static SURFACE: Section = Section {
         ),
         key(
             "order",
-            Kind::Whole { min: 1, max: 8 },
+            Kind::Whole { min: 0, max: 8 },
             Number(2.0),
-            "r-function only: the larger, the nearer to the distance profile",
+            "r-function only: the larger, the nearer to the distance profile; 0 = half planes joined by conjunction and disjunction",
         ),
         key(
             "directions",
@@ -886,8 +889,15 @@ pub(super) static SURFACE: Section = Section {
         key(
             "control",
             Kind::Choice(CONTROLS),
-            Text("even"),
-            "subdivision: the mesh it starts from: even rungs, or sleeves split or paired in 4 or 6 triangles",
+            Rule("even; kobbelt and coons: quads"),
+            "subdivision: the mesh it starts from: even rungs in triangles (even) or quadrilaterals (quads, for catmull-clark, \
+             doo-sabin, kobbelt and coons), or sleeves split or paired in 4 or 6 triangles",
+        ),
+        key(
+            "draft_deg",
+            deg(1.0, 85.0),
+            Rule("as the surface comes"),
+            "coons only: angle of the surface above the plane all along the outline; 30 = a gentle slope, 80 = nearly upright",
         ),
         key(
             "ridge_true",

@@ -310,6 +310,7 @@ fn uses(method: &str, key: &str) -> bool {
         "width_power" if method == "teddy" => false,
         "levels" | "control" => subdivides,
         "adaptive_mm" => method == Scheme::Butterfly.name(),
+        "draft_deg" => method == Scheme::Coons.name(),
         "ridge_true" => method == "patches",
         // The patches of the thesis know single junctions and pairs of them only.
         "junctions" | "join" if method == "patches" => false,
@@ -349,12 +350,23 @@ fn surface_of(table: &Table<'_>, method: &str) -> Result<SurfaceSpec, JobError> 
     }
     let crest = read_crest(table, profile)?;
     if let Some(&scheme) = Scheme::ALL.iter().find(|scheme| scheme.name() == method) {
-        let controls = [Control::Even, Control::Split, Control::Quad4, Control::Quad6];
+        let controls =
+            [Control::Even, Control::Split, Control::Quad4, Control::Quad6, Control::Quads];
+        let control = match table.raw("control") {
+            Some(_) => controls[table.choice("control")],
+            None => scheme.usual_control(),
+        };
+        if control == Control::Quads && !scheme.takes_polygons() {
+            let message = format!("{method} refines triangles, and control = \"quads\" has none");
+            let help = "leave control out, or take catmull-clark, doo-sabin, kobbelt or coons";
+            return Err(table.impossible("control", &message, "quadrilaterals", help));
+        }
         return Ok(SurfaceSpec::Subdivision(SubdivisionSpec {
             scheme,
             levels: table.number("levels").map(|levels| levels as u32),
             adaptive_mm: table.number("adaptive_mm"),
-            control: controls[table.choice("control")],
+            draft_rad: table.number("draft_deg").map(f64::to_radians),
+            control,
             crest,
         }));
     }

@@ -29,7 +29,7 @@ pub enum SurfaceSpec {
     RFunction {
         /// The shape of the flank.
         profile: Profile,
-        /// Exponent of the joins: the larger, the nearer to the distance.
+        /// Exponent of the joins: the larger, the nearer to the distance; 0: half planes, joined two by two.
         order: u32,
     },
     /// Height by the middles of scan lines.
@@ -159,6 +159,8 @@ pub struct SubdivisionSpec {
     /// Modified butterfly only: triangles are cut only while a new vertex would leave the middle of its edge by more
     /// than this, mm; `None`: all.
     pub adaptive_mm: Option<f64>,
+    /// Coons only: the angle of the surface over the plane along the outline, radians; `None`: as it comes.
+    pub draft_rad: Option<f64>,
     /// How the control mesh is made.
     pub control: Control,
     /// What the crest is made with; its profile plays no part.
@@ -202,6 +204,9 @@ pub enum Scheme {
     Butterfly,
     /// Butterfly (Dyn, Levin, Gregory 1990): interpolating, not smooth where valences are 3 or above 7.
     ButterflyOriginal,
+    /// Modified butterfly with the ray rule between boundary and inside: poles and junctions rise higher beside the rim,
+    /// at the price of a rougher surface.
+    ButterflyRay,
     /// Loop (1987): approximating.
     Loop,
     /// Kobbelt (2000): approximating, three times the triangles a step.
@@ -210,17 +215,24 @@ pub enum Scheme {
     CatmullClark,
     /// Doo and Sabin (1978): approximating, dual; cuts the corners of the outline.
     DooSabin,
+    /// Kobbelt (1996): interpolating, quadrilaterals.
+    Kobbelt,
+    /// Coons patches of cubics with tangents at the vertices: interpolating, quadrilaterals; holds an angle at the outline.
+    Coons,
 }
 
 impl Scheme {
     /// All of them.
-    pub const ALL: [Self; 6] = [
+    pub const ALL: [Self; 9] = [
         Self::Butterfly,
         Self::ButterflyOriginal,
+        Self::ButterflyRay,
         Self::Loop,
         Self::Sqrt3,
         Self::CatmullClark,
         Self::DooSabin,
+        Self::Kobbelt,
+        Self::Coons,
     ];
 
     /// Its name in job files.
@@ -228,16 +240,36 @@ impl Scheme {
         match self {
             Self::Butterfly => "butterfly",
             Self::ButterflyOriginal => "butterfly-original",
+            Self::ButterflyRay => "butterfly-ray",
             Self::Loop => "loop",
             Self::Sqrt3 => "sqrt3",
             Self::CatmullClark => "catmull-clark",
             Self::DooSabin => "doo-sabin",
+            Self::Kobbelt => "kobbelt",
+            Self::Coons => "coons",
         }
     }
 
     /// True when its surface goes through the vertices of the control mesh.
     pub fn interpolates(self) -> bool {
-        matches!(self, Self::Butterfly | Self::ButterflyOriginal)
+        match self {
+            Self::Butterfly | Self::ButterflyOriginal | Self::ButterflyRay => true,
+            Self::Loop | Self::Sqrt3 | Self::CatmullClark | Self::DooSabin => false,
+            Self::Kobbelt | Self::Coons => true,
+        }
+    }
+
+    /// True when its meshes may have faces of any number of sides; the others refine triangles alone.
+    pub fn takes_polygons(self) -> bool {
+        matches!(self, Self::CatmullClark | Self::DooSabin | Self::Kobbelt | Self::Coons)
+    }
+
+    /// The control mesh that it starts from unless another is asked for.
+    pub fn usual_control(self) -> Control {
+        match self {
+            Self::Kobbelt | Self::Coons => Control::Quads,
+            _ => Control::Even,
+        }
     }
 }
 
@@ -253,6 +285,8 @@ pub enum Control {
     Quad4,
     /// The same in six triangles, with new vertices on the outline.
     Quad6,
+    /// Runs rebuilt on symmetric rungs at even distances, as quadrilaterals between crest and outline.
+    Quads,
 }
 
 /// How the skeleton of an outline is found.

@@ -490,10 +490,19 @@ fn subdivision_surfaces_and_patches_are_read_and_written() {
             panic!("{scheme:?} subdivides")
         };
         let crest = CrestSpec::default();
-        let (levels, adaptive_mm, control) = (None, None, Control::Even);
-        assert_eq!(plain, SubdivisionSpec { scheme, levels, adaptive_mm, control, crest });
+        let (levels, adaptive_mm, draft_rad) = (None, None, None);
+        let control = match scheme.name() {
+            "kobbelt" | "coons" => Control::Quads,
+            _ => Control::Even,
+        };
+        let wanted = SubdivisionSpec { scheme, levels, adaptive_mm, draft_rad, control, crest };
+        assert_eq!(plain, wanted);
     }
-    for (index, name) in keys::CONTROLS.iter().enumerate() {
+    let SurfaceSpec::Subdivision(leaning) = read("{ method = \"coons\", draft_deg = 30 }") else {
+        panic!("it subdivides")
+    };
+    assert!((leaning.draft_rad.unwrap() - std::f64::consts::FRAC_PI_6).abs() < 1e-15);
+    for (index, name) in keys::CONTROLS.iter().take(4).enumerate() {
         let SurfaceSpec::Subdivision(spec) = read(&format!(
             "{{ method = \"butterfly\", levels = 4, adaptive_mm = 0.02, control = \"{name}\", edge_mm = 2 }}"
         )) else {

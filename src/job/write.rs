@@ -397,6 +397,7 @@ fn surface_lines(surface: &SurfaceSpec, of_picture: bool) -> Vec<Line> {
         SurfaceSpec::Subdivision(own) => {
             lines.extend(own.levels.map(|levels| ("levels", levels.to_string())));
             lines.extend(own.adaptive_mm.map(|mm| ("adaptive_mm", number(mm))));
+            lines.extend(own.draft_rad.map(|draft| ("draft_deg", degrees(draft))));
             lines.push(("control", quoted(CONTROLS[own.control as usize])));
         }
         _ => lines.push(("profile", quoted(PROFILES[crest.profile as usize]))),

@@ -39,9 +39,12 @@ pub(super) fn about(method: &str) -> (&'static str, &'static str) {
         "patches" => ("parabolic patches", "master's thesis, 2008"),
         "butterfly" => ("interpolating subdivision", "Zorin, Schröder, Sweldens 1996"),
         "butterfly-original" => ("interpolating subdivision", "Dyn, Levin, Gregory 1990"),
+        "butterfly-ray" => ("interpolating subdivision", "with parabolas beside the rim"),
         "loop" => ("approximating subdivision", "Loop 1987"),
         "sqrt3" => ("approximating subdivision", "Kobbelt 2000"),
         "catmull-clark" => ("approximating subdivision", "Catmull, Clark 1978"),
+        "kobbelt" => ("interpolating subdivision", "Kobbelt 1996"),
+        "coons" => ("interpolating, with tangents", "Coons 1967; Fan, Li, Liu, Deng"),
         "doo-sabin" => ("approximating subdivision", "Doo, Sabin 1978"),
         _ => ("", ""),
     }

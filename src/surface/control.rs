@@ -42,7 +42,7 @@ pub fn control(
 ) -> PolyMesh {
     let rungs: Vec<Rungs> = (cells.runs.iter())
         .map(|run| match form {
-            Control::Even => even(sampled, run),
+            Control::Even | Control::Quads => even(sampled, run),
             Control::Split => chords(sampled, run, |_| true),
             Control::Quad4 | Control::Quad6 => chords(sampled, run, |k| run.kept[k]),
         })
@@ -67,7 +67,8 @@ pub fn control(
     }
     for ((run, rungs), line) in cells.runs.iter().zip(&rungs).zip(&crest.runs) {
         match form {
-            Control::Even => build.even(run, rungs, line),
+            Control::Even => build.even(run, rungs, line, false),
+            Control::Quads => build.even(run, rungs, line, true),
             Control::Split | Control::Quad4 | Control::Quad6 => {
                 build.sleeves(cells, run, line, form);
             }
@@ -231,7 +232,7 @@ impl<'a> Build<'a> {
     }
 
     /// A run rebuilt on rungs; `line` holds the heights of their middles.
-    fn even(&mut self, run: &Run, rungs: &Rungs, line: &[f64]) {
+    fn even(&mut self, run: &Run, rungs: &Rungs, line: &[f64], quads: bool) {
         let n = rungs.left.len().min(rungs.right.len()).min(line.len());
         let (Some(&first), Some(&last)) = (run.edges.first(), run.edges.last()) else { return };
         let feet = [0, 1].map(|side| {
@@ -253,6 +254,21 @@ impl<'a> Build<'a> {
         let [left, right] = feet;
         for j in 0..if run.closed { n } else { n.saturating_sub(1) } {
             let k = (j + 1) % n;
+            if quads {
+                for [a, b, c, d] in [
+                    [left[j], crest[j], crest[k], left[k]],
+                    [crest[j], right[j], right[k], crest[k]],
+                ] {
+                    // Where a side is a single point, a triangle is left of its quadrilateral.
+                    match (a == d, b == c) {
+                        (false, false) => self.mesh.add_face(&[a, b, c, d]),
+                        (true, false) => self.mesh.add_face(&[a, b, c]),
+                        (false, true) => self.mesh.add_face(&[a, b, d]),
+                        (true, true) => {}
+                    }
+                }
+                continue;
+            }
             for face in [
                 [left[j], crest[k], left[k]],
                 [left[j], crest[j], crest[k]],

@@ -5,15 +5,16 @@
 //!                                                                            \--fail--> ratio field
 //! ```
 
+use super::calm::{Ripples, calmer, ripples};
 use super::profile::{self, Flank, lean, own_wall};
 use super::ridge::{Heights, Ridge};
 use super::rungs::{Rungs, rungs};
-use super::subdivide::{PolyMesh, adaptive, limit, subdivide};
+use super::subdivide::{CoonsRules, PolyMesh, adaptive, coons, limit, subdivide};
 use super::{
     FINE, Mesh, Over, Patch, Remark, Rim, RuledFault, Segments, Surface, Way, Window, control,
     inscribed_radius, literal, ratio, rim, ruled,
 };
-use crate::geom::{DVec2, Grid, Tolerance};
+use crate::geom::{Grid, Tolerance};
 use crate::job::{CrestSpec, LayerSpec, Scheme, SkeletonSpec, SubdivisionSpec, SurfaceSpec};
 use crate::outline::{Figure, Region};
 use crate::skeleton::{
@@ -26,10 +27,6 @@ use rayon::prelude::*;
 const FACET_PER_CHORD: f64 = 0.05;
 /// Shortest edge of the resampled outline, in cells.
 const LEAST_EDGE_CELLS: f64 = 2.0;
-/// An end of the spine is a ripple when its base is narrower than this part of the largest inscribed radius.
-const RIPPLE: f64 = 0.35;
-/// More ripples than this make an outline rough.
-const RIPPLES: usize = 12;
 /// Most levels of subdivision that nobody asked for, and most faces that these may lead to.
 const MOST_LEVELS: f64 = 5.0;
 const MOST_DEFAULT_FACES: usize = 1 << 22;
@@ -152,28 +149,6 @@ pub(super) fn raise(
     if parts.len() == 1 { parts.swap_remove(0) } else { Surface::Parts(parts) }
 }
 
-/// A remark when more than [`RIPPLES`] ends of the spine, and more than half of them, close limbs much narrower than
-/// the figure. The number of corners says nothing here: noise makes as many of them as of ends.
-fn rough(skeleton: &Skeleton, inscribed_mm: f64, at: DVec2) -> Option<Remark> {
-    let sampled = &skeleton.sampled;
-    let caps = &skeleton.cells.caps;
-    let small = caps.iter().filter(|cap| !cap.closed).filter_map(|cap| {
-        let (a, b) = (sampled.at(*cap.chain.first()?), sampled.at(*cap.chain.last()?));
-        (a.distance(b) < RIPPLE * inscribed_mm).then(|| {
-            let edges = cap.chain[..cap.chain.len() - 1].iter();
-            edges.map(|v| sampled.edge_length(*v)).sum::<f64>()
-        })
-    });
-    let lengths: Vec<f64> = small.collect();
-    let ripples = lengths.len();
-    let many = ripples > RIPPLES && 2 * ripples > caps.len();
-    many.then(|| Remark::Rough {
-        ripples,
-        length_mm: lengths.iter().sum::<f64>() / ripples as f64,
-        at,
-    })
-}
-
 /// One region and all that its surface depends on.
 struct Part<'a> {
     region: &'a Region,
@@ -205,11 +180,12 @@ impl Part<'_> {
                 return Surface::Field(profile::raise(&figure, &flank, grid, &mut Vec::new()));
             }
         };
-        remarks.extend(rough(&skeleton, inscribed, at));
+        let (skeleton, calmed) = self.calmed(skeleton, &fineness, inscribed, remarks);
         let ridge = ridge_of(layer, crest, region.holes.len() + 1);
         let heights = ridge.heights(&skeleton.spine);
         self.remark_cap(&heights, remarks);
         let mesh = match &layer.surface {
+            _ if calmed => None,
             SurfaceSpec::Ruled(_) => Some(skeleton.mesh(&heights, &ridge, &fineness)),
             SurfaceSpec::Patches { ridge_true, .. } => {
                 let over = if *ridge_true { Over::Ridge } else { Over::Control };
@@ -247,6 +223,27 @@ impl Part<'_> {
         };
         lower_walls(&mut patch, std::slice::from_ref(region), layer, crest, grid);
         Surface::Field(patch)
+    }
+
+    /// The skeleton of a calmer copy of a rough outline, and true, when the layer asks for insignificant branches to be
+    /// left out, as layers of pictures do; else the one it has. Remarks on rough outlines either way.
+    fn calmed(
+        &self,
+        skeleton: Skeleton,
+        fineness: &Fineness,
+        inscribed: f64,
+        remarks: &mut Vec<Remark>,
+    ) -> (Skeleton, bool) {
+        let Some(Ripples { count: ripples, length_mm }) = ripples(&skeleton, inscribed) else {
+            return (skeleton, false);
+        };
+        let (region, spec) = (self.region, &self.crest.skeleton);
+        let calmer =
+            (spec.significance).and_then(|_| calmer(region, spec, fineness, inscribed, length_mm));
+        let calmed = calmer.is_some();
+        let at = region.bounds().center();
+        remarks.push(Remark::Rough { ripples, length_mm, at, calmed });
+        (calmer.unwrap_or(skeleton), calmed)
     }
 
     /// Says so when the slope cap keeps even the highest place of the crest down.
@@ -313,8 +310,12 @@ impl Skeleton {
     ) -> Result<Subdivided, RuledFault> {
         let control = control(&self.sampled, &self.cells, ridge, spec.control, Rim::Curve);
         let levels = spec.levels.unwrap_or_else(|| levels(&control, spec.scheme, cell_mm));
+        let draft_rad = spec.draft_rad;
         let fine = match spec.adaptive_mm {
             Some(tolerance_mm) => adaptive(&control, tolerance_mm, levels),
+            None if spec.scheme == Scheme::Coons => {
+                coons(&control, CoonsRules { draft_rad, ..CoonsRules::default() }, levels)
+            }
             None => subdivide(&control, spec.scheme, levels),
         };
         let settled = fine.and_then(|fine| limit(&fine, spec.scheme));

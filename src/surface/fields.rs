@@ -1,13 +1,15 @@
 //! Region -> heights without a skeleton: R-functions and scan lines.
 //!
 //! *R-function* (Rvachev; the normalised joins of Biswas and Shapiro 2004): a function that is positive inside the
-//! outline, zero on it and smooth elsewhere, joined from one of each segment. Near the outline it is the distance.
+//! outline, zero on it and smooth elsewhere, joined from one of each segment. Near the outline it is the distance. With
+//! order 0 it is joined from the half planes of the edges ([`super::halfplanes`]).
 //!
 //! *Scan lines* (after Chen et al. 2008, who only tell that middles of scan lines and a normal distribution are used;
 //! all else is a reconstruction): with one direction the height goes by the place in the row's own interval; with
 //! more the middles of the lines in all directions are samples of a spine, kept where no other direction has a much
 //! shorter chord and a disc fits.
 
+use super::halfplanes::Formula;
 use super::profile::{self, Flank, capped_height, profile_at, sample};
 use super::{Patch, Remark, Segments, Window, inscribed_radius, inside_spans, lower_walls};
 use crate::geom::{DVec2, Grid, Ring, Tolerance, distance_to_segment};
@@ -126,8 +128,8 @@ fn coarser(ring: &[DVec2], chord_mm: f64) -> Ring {
 }
 
 /// `z = b + (H - b) f(w / w_max)` at the nodes inside the region, NaN outside; `w` is the R-function of the outline,
-/// joined with exponent `order` (1 or more: the larger, the nearer to the distance), `w_max` its largest value at a
-/// node. Every node looks at every edge.
+/// joined with exponent `order` (1 or more: the larger, the nearer to the distance; 0: the half planes of the edges,
+/// joined two by two), `w_max` its largest value at a node. Every node looks at every edge.
 ///
 /// The function depends on how the outline is cut into edges: many short ones give it a soft foot. So it is made of as
 /// few edges as stay within `chord_mm` of the outline.
@@ -143,11 +145,14 @@ pub fn r_function(
     let mut patch = Patch::empty(*window);
     let coarse: Vec<Ring> = region.rings().map(|ring| coarser(ring, chord_mm)).collect();
     let edges: Vec<[DVec2; 2]> = coarse.iter().flat_map(|ring| closed(ring)).collect();
+    let formula = (order == 0).then(|| Formula::of(&coarse));
     let rows = inside_spans(region.rings(), grid, window);
     let mut w = vec![f64::NAN; patch.z.len()];
     w.par_chunks_mut(window.nx.max(1)).zip(&rows).enumerate().for_each(|(j, (w, spans))| {
         for i in spans.iter().flat_map(|&(first, end)| first as usize..end as usize) {
-            w[i] = joined(grid.node(window.i0 + i, window.j0 + j), &edges, order);
+            let at = grid.node(window.i0 + i, window.j0 + j);
+            w[i] =
+                formula.as_ref().map_or_else(|| joined(at, &edges, order), |f| f.at(at).max(0.0));
         }
     });
     let most = w.iter().copied().fold(0.0, f64::max);

@@ -36,8 +36,9 @@ fn rank(remark: &Remark) -> (usize, f64) {
         Remark::DrawnIn { covered } => (7, covered),
         Remark::Unfolded { part } => (8, -part),
         Remark::RidgeBelowBase => (9, 0.0),
-        Remark::Rough { ripples, .. } => (10, -(ripples as f64)),
-        Remark::Folded { count, .. } => (11, -(count as f64)),
+        Remark::Rough { ripples, calmed: false, .. } => (10, -(ripples as f64)),
+        Remark::Rough { ripples, .. } => (11, -(ripples as f64)),
+        Remark::Folded { count, .. } => (12, -(count as f64)),
     }
 }
 
@@ -108,7 +109,13 @@ impl Worst<'_> {
                  highest part counts there; a smaller half_width_mm or surface.edge_mm straightens it",
                 place(at)
             ),
-            Remark::Rough { ripples, length_mm, at } => format!(
+            Remark::Rough { ripples, length_mm, at, calmed: true } => format!(
+                "the outline of {n} part(s) is rough: {n} crest(s) follow a smoothed copy of it (ratio field); the worst has \
+                 {ripples} ripples, about {length_mm:.2} mm long ({}); where they are not meant, raise \
+                 artwork.trace.smooth_px to about their length in pixels, and the outline is smoothed, too",
+                place(at)
+            ),
+            Remark::Rough { ripples, length_mm, at, calmed: false } => format!(
                 "the outline of {n} part(s) is rough, and its ripples end up in the crest; the worst has {ripples} of \
                  them, about {length_mm:.2} mm long ({}); where they are not meant, smooth the path, or in a picture \
                  raise artwork.trace.smooth_px to about their length in pixels",

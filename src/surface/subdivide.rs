@@ -11,9 +11,11 @@ mod adaptive;
 mod butterfly;
 mod catmull_clark;
 mod closed_form;
+mod coons;
 mod doo_sabin;
 mod evaluate;
 mod iso;
+mod kobbelt;
 mod loop_scheme;
 mod masks;
 mod spaced;
@@ -22,6 +24,7 @@ mod topology;
 
 pub use adaptive::adaptive;
 pub use closed_form::ClosedForm;
+pub use coons::{CoonsMesh, CoonsRules, Handle};
 pub use evaluate::{EvaluateError, LimitSurface, Sample};
 pub use iso::{IsoFault, iso_line};
 pub use masks::{LimitRows, limit_rows};
@@ -72,6 +75,11 @@ impl PolyMesh {
     pub fn add_face(&mut self, face: &[u32]) {
         self.loops.extend_from_slice(face);
         self.start.push(self.loops.len() as u32);
+    }
+
+    /// Its vertices and corners without its faces.
+    fn clone_vertices(&self) -> Self {
+        Self { vertices: self.vertices.clone(), corner: self.corner.clone(), ..Self::new() }
     }
 
     /// Number of faces.
@@ -192,6 +200,12 @@ pub enum SubdivideError {
 /// [`SubdivideError`]: the mesh is no manifold, has faces that the scheme cannot take, or would get too fine.
 pub fn subdivide(mesh: &PolyMesh, scheme: Scheme, levels: u32) -> Result<PolyMesh, SubdivideError> {
     let mut mesh = mesh.clone();
+    if scheme == Scheme::Coons {
+        return coons(&mesh, CoonsRules::default(), levels);
+    }
+    if scheme == Scheme::Kobbelt {
+        mesh = kobbelt::quads(&mesh)?;
+    }
     for level in 0..levels {
         let faces = mesh.len().saturating_mul(4);
         if faces > MOST_FACES {
@@ -203,13 +217,27 @@ pub fn subdivide(mesh: &PolyMesh, scheme: Scheme, levels: u32) -> Result<PolyMes
             Scheme::ButterflyOriginal => {
                 butterfly::step(&mesh, &topology, butterfly::Variant::Original)?
             }
+            Scheme::ButterflyRay => butterfly::step(&mesh, &topology, butterfly::Variant::Ray)?,
             Scheme::Loop => loop_scheme::step(&mesh, &topology)?,
             Scheme::Sqrt3 => sqrt3::step(&mesh, &topology, level.is_multiple_of(2))?,
             Scheme::CatmullClark => catmull_clark::step(&mesh, &topology),
             Scheme::DooSabin => doo_sabin::step(&mesh, &topology),
+            Scheme::Kobbelt | Scheme::Coons => kobbelt::step(&mesh, &topology),
         };
     }
     Ok(mesh)
+}
+
+/// Refines a mesh `levels` times inside Coons patches, from the first tangents that the rules give it.
+///
+/// # Errors
+/// [`SubdivideError`]: the mesh is no manifold, or gets too large.
+pub fn coons(mesh: &PolyMesh, rules: CoonsRules, levels: u32) -> Result<PolyMesh, SubdivideError> {
+    let mut coons = CoonsMesh::new(mesh.clone(), rules)?;
+    for _ in 0..levels {
+        coons = coons.refined()?;
+    }
+    Ok(coons.into_mesh())
 }
 
 /// Moves the vertices to where further steps would take them in the end.
@@ -222,7 +250,12 @@ pub fn subdivide(mesh: &PolyMesh, scheme: Scheme, levels: u32) -> Result<PolyMes
 /// [`SubdivideError`]: the mesh is no manifold.
 pub fn limit(mesh: &PolyMesh, scheme: Scheme) -> Result<PolyMesh, SubdivideError> {
     let inner: fn(&PolyMesh, &[u32], &[u32], DVec3) -> Option<DVec3> = match scheme {
-        Scheme::Butterfly | Scheme::ButterflyOriginal | Scheme::DooSabin => {
+        Scheme::Butterfly
+        | Scheme::ButterflyOriginal
+        | Scheme::ButterflyRay
+        | Scheme::Kobbelt
+        | Scheme::Coons
+        | Scheme::DooSabin => {
             return Ok(mesh.clone());
         }
         Scheme::Loop => {

@@ -28,6 +28,8 @@ pub(super) enum Variant {
     /// The regular rule wherever both ends lie inside, whatever their valence: not smooth at valence 3 and from 8 on.
     /// It says nothing of edges that touch the boundary; they follow the table.
     Original,
+    /// From the boundary to the inside straight over the inner end to the vertex opposite; all else by the table.
+    Ray,
 }
 
 /// Edges that one task works on.
@@ -96,6 +98,8 @@ impl Stencil<'_> {
             (Inside { .. }, Inside { .. }) if self.variant == Variant::Original => {
                 self.regular(h, t)
             }
+            (Boundary { .. }, Inside { .. }) if self.variant == Variant::Ray => self.ray(t, ring),
+            (Inside { .. }, Boundary { .. }) if self.variant == Variant::Ray => self.ray(h, ring),
             (Inside { regular: true }, Inside { regular: true }) => self.regular(h, t),
             (Inside { regular: false }, Inside { regular: true } | Boundary { regular: true }) => {
                 self.about_inside(h, ring)
@@ -173,6 +177,15 @@ impl Stencil<'_> {
             if first { (ring[5], ring[2], ring[4]) } else { (ring[1], ring[4], ring[2]) };
         let pull = 0.0625 * (self.at(near) - self.at(far)) + 0.1875 * self.at(wing);
         0.375 * self.at(b) + 0.625 * self.at(c) + pull - 0.0625 * self.at(q1) - 0.125 * self.at(q2)
+    }
+
+    /// From the inside, where `h` starts, to the boundary: the parabola through both and the vertex opposite the
+    /// boundary's in the ring of the inner one, or the mean of the two that are nearest to that.
+    fn ray(&self, h: u32, ring: &mut Vec<u32>) -> DVec3 {
+        self.topology.ring_from(h, ring);
+        let n = ring.len();
+        let opposite = 0.5 * (self.at(ring[n / 2]) + self.at(ring[n.div_ceil(2)]));
+        0.375 * self.at(ring[0]) + 0.75 * self.at(self.topology.from(h)) - 0.125 * opposite
     }
 
     /// Across the figure from one regular vertex of the boundary to another.

@@ -16,8 +16,7 @@ pub(super) fn step(mesh: &PolyMesh, topology: &Topology) -> PolyMesh {
     for (k, face) in mesh.faces().enumerate() {
         face_of.extend(std::iter::repeat_n(k, face.len()));
     }
-    let mut out = PolyMesh::with_vertices(mesh.vertices.clone());
-    out.corner.clone_from(&mesh.corner);
+    let mut out = mesh.clone_vertices();
     let mut ring = Vec::new();
     for v in 0..mesh.vertices.len() as u32 {
         topology.ring(v, &mut ring);

@@ -3,13 +3,16 @@
 use super::*;
 use proptest::prelude::*;
 
-const SCHEMES: [Scheme; 6] = [
+const SCHEMES: [Scheme; 9] = [
     Scheme::Butterfly,
     Scheme::ButterflyOriginal,
+    Scheme::ButterflyRay,
     Scheme::Loop,
     Scheme::Sqrt3,
     Scheme::CatmullClark,
     Scheme::DooSabin,
+    Scheme::Kobbelt,
+    Scheme::Coons,
 ];
 
 fn mesh(vertices: &[[f64; 3]], faces: &[&[u32]]) -> PolyMesh {
@@ -165,6 +168,8 @@ fn a_hexagonal_fan_is_refined_as_tabled() {
     let inner = fine.vertices[7..].iter().filter(|v| v.z > 1e-9);
     assert_eq!(inner.clone().count(), 6);
     inner.for_each(|v| near(v.z, 0.5));
+    let fine = subdivide(&hexagon(), Scheme::ButterflyRay, 1).unwrap();
+    fine.vertices[7..].iter().filter(|v| v.z > 1e-9).for_each(|v| near(v.z, 0.75));
     let fine = subdivide(&hexagon(), Scheme::Loop, 1).unwrap();
     near(fine.vertices[0].z, 0.625);
     assert!(holds(&fine, [0.875, 0.0, 0.0]) && holds(&fine, [0.375, 0.0, 0.5]));
@@ -315,8 +320,13 @@ proptest! {
                 }
             }
             let faces = match scheme {
-                Scheme::Butterfly | Scheme::ButterflyOriginal | Scheme::Loop => rim.len() << (2 * levels),
-                Scheme::CatmullClark => (3 * rim.len()) << (2 * (levels - 1)),
+                Scheme::Butterfly
+                | Scheme::ButterflyOriginal
+                | Scheme::ButterflyRay
+                | Scheme::Loop => rim.len() << (2 * levels),
+                // Polygons are cut before the first step.
+                Scheme::Kobbelt => (3 * rim.len()) << (2 * levels),
+                Scheme::CatmullClark | Scheme::Coons => (3 * rim.len()) << (2 * (levels - 1)),
                 Scheme::Sqrt3 if levels == 2 => 9 * rim.len(),
                 Scheme::Sqrt3 | Scheme::DooSabin => fine.len(),
             };
@@ -357,6 +367,7 @@ fn ridges_sink_as_tabled() {
         (Scheme::DooSabin, false, 0.75),
         (Scheme::Butterfly, true, 1.0),
         (Scheme::ButterflyOriginal, true, 1.0),
+        (Scheme::ButterflyRay, true, 1.0),
     ] {
         let fine = limit(&subdivide(&band(triangles), scheme, 4).unwrap(), scheme).unwrap();
         // Between its vertices the ridge of Kobbelt's surface is not level: it goes by the old one in the middle.
