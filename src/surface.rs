@@ -31,7 +31,8 @@ pub use control::{Rim, control};
 pub use crested::{Fineness, Skeleton, Subdivided, lower_walls, ridge_of};
 pub use distance::Segments;
 pub use drawn::{
-    Control, Course, CrestFault, DrawnCrest, DrawnSettings, control_over, drawn_path, drawn_surface,
+    Control, Course, CrestFault, DrawnCrest, DrawnSettings, control_over, drawn_path,
+    drawn_surface, levels,
 };
 pub use fields::{Rise, r_function, scan_lines};
 pub use inscribed::inscribed_radius;
@@ -48,8 +49,9 @@ pub use ridge::{Heights, Ridge};
 pub use ruled::{Density, RuledFault, check as check_ruled, mesh as ruled_mesh};
 pub use rungs::{Rungs, rungs};
 pub use subdivide::{
-    ClosedForm, EvaluateError, IsoFault, LimitRows, LimitSurface, MOST_FACES, PolyMesh, Sample,
-    SpacedMesh, SubdivideError, Topology, adaptive, iso_line, limit, limit_rows, subdivide,
+    ClosedForm, CreasedMesh, EvaluateError, IsoFault, LimitRows, LimitSurface, MOST_FACES,
+    PolyMesh, SHARP, Sample, SpacedMesh, SubdivideError, Topology, adaptive, iso_line, limit,
+    limit_rows, subdivide,
 };
 
 use crate::geom::{Bounds, Grid, Tolerance};

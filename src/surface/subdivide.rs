@@ -11,6 +11,7 @@ mod adaptive;
 mod butterfly;
 mod catmull_clark;
 mod closed_form;
+mod creased;
 mod doo_sabin;
 mod evaluate;
 mod iso;
@@ -22,6 +23,7 @@ mod topology;
 
 pub use adaptive::adaptive;
 pub use closed_form::ClosedForm;
+pub use creased::{CreasedMesh, SHARP};
 pub use evaluate::{EvaluateError, LimitSurface, Sample};
 pub use iso::{IsoFault, iso_line};
 pub use masks::{LimitRows, limit_rows};
