@@ -137,7 +137,7 @@ impl Model {
         let control::Control { mesh, is_closed, notes } =
             control::control(obj::read(bytes, file)?, file, spec)?;
         let corners: usize = mesh.mesh().faces().map(<[u32]>::len).sum();
-        let wanted = (1..).find(|k| corners << (2 * (k - 1)) >= SIZED_FACES).unwrap_or(1);
+        let wanted = (1..8).find(|k| corners << (2 * (k - 1)) >= SIZED_FACES).unwrap_or(8);
         let sized = mesh.limit(spec.levels.map_or(wanted, |levels| wanted.min(levels)));
         let sized = sized.map_err(|why| ModelError::Mesh { file: file.to_owned(), why })?;
         let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
@@ -193,7 +193,9 @@ impl Model {
         };
         let (mut up, mut down): (Vec<_>, Vec<_>) =
             faces.into_iter().filter(|face| area(face) != 0.0).partition(|face| area(face) > 0.0);
-        down.iter_mut().for_each(|face| face.swap(1, 2));
+        for face in &mut down {
+            face.swap(1, 2);
+        }
         // An open mesh that looks down as a whole was drawn inside out, and a closed one has its underside up.
         let sum = |faces: &[[u32; 3]]| faces.iter().map(area).map(f64::abs).sum::<f64>();
         let volume = |faces: &[[u32; 3]]| {

@@ -32,10 +32,9 @@ pub(super) fn load(path: &Path) -> Result<Input> {
             let text = files::read_text(path)?;
             let load = |name: &str| std::fs::read_to_string(beside.join(name));
             let draft = Draft::from_toml(&text, &path.display().to_string(), &library, &load)?;
-            let file = match draft.artwork().is_given() {
-                true => beside.join(&draft.artwork().file),
-                false => path.to_path_buf(),
-            };
+            let is_given = draft.artwork().is_given();
+            let file =
+                if is_given { beside.join(&draft.artwork().file) } else { path.to_path_buf() };
             (draft, file)
         }
         known if known == "svg" || known == "svgz" || ArtworkSpec::PICTURES.contains(&known) => {
@@ -48,6 +47,12 @@ pub(super) fn load(path: &Path) -> Result<Input> {
                 path.display()
             )
         }
+        "obj" => bail!(
+            "{}: a mesh is a layer of a job; write a file mesh.toml with the two lines [[layer]] and mesh = \"{}\" beside it \
+             and give that",
+            path.display(),
+            path.file_name().unwrap_or_default().to_string_lossy()
+        ),
         other => bail!(
             "{}: '.{other}' files are not read; give a job file (.toml) or artwork (.svg, .svgz, .png, .jpg)",
             path.display()

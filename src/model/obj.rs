@@ -1,7 +1,7 @@
 //! OBJ text -> vertices, faces, crease tags, each with its line.
 //!
 //! Read are `v`, `f` (with `v/vt/vn` and negative indices), `l` (its edges become creases), `o` and `g` (names of parts) and
-//! the tags `t crease` and `t corner` that OpenSubdiv writes. Texture, normals, materials and smoothing groups say nothing
+//! the tags `t crease` and `t corner` that `OpenSubdiv` writes. Texture, normals, materials and smoothing groups say nothing
 //! about the shape of a control mesh and are passed over; curves, surfaces and whatever is no OBJ at all are refused.
 
 use super::ModelError;
@@ -16,7 +16,7 @@ const MOST_CORNERS: usize = 1 << 18;
 /// Largest coordinate.
 const FARTHEST: f64 = 1e9;
 /// What says nothing about the shape.
-const PASSED_OVER: [&str; 15] = [
+const PASSED_OVER: [&str; 16] = [
     "vt",
     "vn",
     "vp",
@@ -32,6 +32,7 @@ const PASSED_OVER: [&str; 15] = [
     "shadow_obj",
     "trace_obj",
     "mg",
+    "p",
 ];
 /// Curves and surfaces of other kinds.
 const FREE_FORM: [&str; 14] = [
@@ -166,7 +167,6 @@ impl Reader<'_> {
                 self.groups = rest.iter().map(|word| self.name(word.0)).collect();
                 Ok(())
             }
-            "p" => Ok(()),
             _ if PASSED_OVER.contains(&key) => Ok(()),
             _ if FREE_FORM.contains(&key) => Err(self.fault(
                 place,
@@ -307,15 +307,13 @@ impl Reader<'_> {
         let count = self.obj.vertices.len();
         let mut vertices = Vec::with_capacity(whole);
         for word in &rest[..whole] {
-            match word.0.parse::<u32>().ok().filter(|v| (*v as usize) < count) {
-                Some(v) => vertices.push(v),
-                None => {
-                    let what = format!(
-                        "no vertex can be meant here: {count} stand above, and tags count them from 0"
-                    );
-                    return Err(self.fault(word.1, what));
-                }
-            }
+            let vertex = word.0.parse::<u32>().ok().filter(|v| (*v as usize) < count);
+            vertices.push(vertex.ok_or_else(|| {
+                let what = format!(
+                    "no vertex can be meant here: {count} stand above, and tags count them from 0"
+                );
+                self.fault(word.1, what)
+            })?);
         }
         let mut values = Vec::with_capacity(sharp);
         for word in &rest[whole..whole + sharp] {

@@ -212,13 +212,11 @@ fn the_target_is_the_limit_surface_at_the_nodes() {
 fn a_closed_mesh_is_seen_from_above() {
     let job = "[relief]\npitch_mm = 0.2\n[[layer]]\nmesh = { file = \"m.obj\", width_mm = 20 }\nheight_mm = 7\n";
     let out = design(job, CUBE, None).unwrap();
-    let turned: String = CUBE
-        .lines()
-        .map(|line| match line.strip_prefix("f ") {
-            Some(face) => format!("f {}\n", face.split(' ').rev().collect::<Vec<_>>().join(" ")),
-            None => format!("{line}\n"),
-        })
-        .collect();
+    let lines = CUBE.lines().map(|line| match line.strip_prefix("f ") {
+        Some(face) => format!("f {}", face.split(' ').rev().collect::<Vec<_>>().join(" ")),
+        None => line.to_owned(),
+    });
+    let turned = lines.collect::<Vec<_>>().join("\n");
     let inside_out = design(job, &turned, None).unwrap();
     assert!(out.notes.iter().all(|note| !note.contains("below others")), "{:?}", out.notes);
     assert!(inside_out.notes.iter().all(|note| !note.contains("below others")));

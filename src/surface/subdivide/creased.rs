@@ -138,7 +138,7 @@ mod tests {
 
     /// The cube of section 3, (+-1)^3, its top face last.
     fn cube() -> PolyMesh {
-        let sign = |k: u32, bit: u32| if k >> bit & 1 == 1 { 1.0 } else { -1.0 };
+        let sign = |k: u32, bit: u32| if (k >> bit) & 1 == 1 { 1.0 } else { -1.0 };
         let at = |k: u32| DVec3::new(sign(k, 0), sign(k, 1), sign(k, 2));
         let mut mesh = PolyMesh::with_vertices((0..8).map(at).collect());
         let faces =
