@@ -106,6 +106,7 @@ impl Shape {
             Selector::Label(label) => self.labels.contains(label),
             Selector::Id(id) => self.ids.contains(id),
             Selector::Layer(label) => self.layers.contains(label),
+            Selector::Mesh(_) => false,
         }
     }
 }
@@ -124,6 +125,11 @@ pub struct Artwork {
 }
 
 impl Artwork {
+    /// No artwork: for jobs whose layers are all meshes.
+    pub fn none() -> Self {
+        Self { shapes: Vec::new(), unit_mm: None, picture: None, notes: Vec::new() }
+    }
+
     /// The box around all carvable shapes, in the artwork's units; never empty for artwork that was read.
     pub fn bounds(&self) -> Bounds {
         carvable_bounds(&self.shapes)

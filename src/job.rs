@@ -15,6 +15,7 @@ mod library;
 mod draft;
 mod speeds;
 mod crest;
+mod mesh;
 mod layer;
 mod group;
 mod operation;
@@ -28,6 +29,7 @@ pub use draft::Draft;
 pub use error::{Fault, JobError};
 pub use group::GroupSpec;
 pub use library::{BUILT_IN_FILES, Library};
+pub use mesh::MeshSpec;
 pub use smooth::{DrawnCurves, SmoothSpec};
 pub use surface::{
     Control, CourseSpec, CrestSpec, DrawnCrestSpec, DrawnSpec, Join, Profile, Prune, Scheme,

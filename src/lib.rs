@@ -15,6 +15,7 @@
 //! | `outline` | curves -> `Region`s (outer ring + holes): flatten, resolve, orient, nest | geom job artwork |
 //! | `skeleton` | `Region` -> resampled rings, constrained Delaunay triangles, classes T/S/J, cells, runs, spine | geom job outline |
 //! | `surface` | region + cells + layer settings -> `Mesh` or height field; one file per method | geom job outline skeleton |
+//! | `model` | OBJ bytes + how a layer takes them -> a control mesh; its limit surface as the layer's outline and triangles | geom job outline surface |
 //! | `relief` | layers' surfaces -> the relief heightfield: rasterise, combine, blend, background: the *target* | geom job outline surface |
 //! | `heights` | height images (PNG) and meshes (STL) from elsewhere -> a `Heightfield` | geom |
 //! | `compare` | one artwork, or the known shapes of the tables, raised by every method -> what each surface measures | geom job outline skeleton surface relief |
@@ -38,6 +39,7 @@ pub mod artwork;
 pub mod outline;
 pub mod skeleton;
 pub mod surface;
+pub mod model;
 pub mod relief;
 pub mod heights;
 pub mod compare;
@@ -55,7 +57,8 @@ pub mod cli;
 
 use artwork::{Artwork, ArtworkError};
 use geom::{DVec3, Move, MoveKind};
-use job::{Draft, Job, JobError};
+use job::{Draft, Found, Job, JobError};
+use model::{Model, ModelError};
 use motion::RELIABLE_LINES_PER_S;
 use outline::{OutlineError, Outlines};
 use proof::{ProgramText, ProofError, Verdict};
@@ -114,6 +117,8 @@ pub enum CarveError {
     #[error(transparent)]
     Surface(#[from] SurfaceError),
     #[error(transparent)]
+    Model(#[from] ModelError),
+    #[error(transparent)]
     Relief(#[from] ReliefError),
     #[error(transparent)]
     Toolpath(#[from] ToolpathError),
@@ -121,16 +126,18 @@ pub enum CarveError {
     Proof(#[from] ProofError),
 }
 
-/// Carves: from a checked draft and its artwork to proved programs. `enter` hears the name of each stage.
+/// Carves: from a checked draft, its artwork and its meshes (as [`design`] takes them) to proved programs. `enter` hears the
+/// name of each stage.
 ///
 /// # Errors
 /// The first stage that refuses. A proof that ran and failed is no error: see [`Verdict::passed`].
 pub fn carve(
     draft: Draft,
     artwork: &Artwork,
+    models: &[Model],
     enter: &mut dyn FnMut(&str),
 ) -> Result<Carving, CarveError> {
-    let design = design(draft, artwork, enter)?;
+    let design = design(draft, artwork, models, enter)?;
     let (job, target) = (&design.job, &design.relief.target);
     let mut notes = design.notes.clone();
 
@@ -163,22 +170,24 @@ pub fn carve(
     Ok(Carving { design, paths, programs, verdict, notes })
 }
 
-/// The stages up to the target.
+/// The stages up to the target. `models` are the meshes that the draft's layers name ([`Draft::meshes`]), in that order.
 ///
 /// # Errors
 /// As [`carve`].
 pub fn design(
     draft: Draft,
     artwork: &Artwork,
+    models: &[Model],
     enter: &mut dyn FnMut(&str),
 ) -> Result<Design, CarveError> {
     enter("outlines");
-    let job = draft.settle(&artwork.found())?;
+    let job = draft.settle(&found(artwork, models))?;
     let placed = artwork.place(&job.layers, job.artwork_unit_mm, job.artwork_lower_left_mm)?;
-    let outlines = outline::trace(&placed, &job.layers, &job.tolerance)?;
+    let mut outlines = outline::trace(&placed, &job.layers, &job.tolerance)?;
     enter("surfaces");
     let grid = relief::grid_of(&job)?;
-    let raised = surface::raise_all(&outlines, &job.layers, &grid, &job.tolerance)?;
+    let mut raised = surface::raise_all(&outlines, &job.layers, &grid, &job.tolerance)?;
+    model::raise(models, &job, &grid, &mut outlines, &mut raised)?;
     enter("merge");
     let raised_notes = raised.notes.clone();
     let relief = relief::merge(&job, &outlines, raised.surfaces, &grid)?;
@@ -188,6 +197,11 @@ pub fn design(
         .cloned()
         .collect();
     Ok(Design { job, outlines, relief, notes })
+}
+
+/// What a job needs to know of its artwork and its meshes before it can be settled.
+pub fn found(artwork: &Artwork, models: &[Model]) -> Found {
+    Found { meshes: models.iter().map(Model::size).collect(), ..artwork.found() }
 }
 
 /// The program of a toolpath, its header filled in.

@@ -13,12 +13,14 @@ mod check;
 mod melt;
 mod notes;
 mod regions;
+mod silhouette;
 mod smooth;
 mod trace;
 
 pub use check::RegionFault;
 pub(crate) use check::meeting_edges;
 pub use melt::melted;
+pub use silhouette::silhouette;
 pub use trace::trace;
 
 use crate::geom::{Bounds, DVec2, Ring, bounds_of, contains_even_odd, signed_area};
@@ -69,7 +71,7 @@ pub struct Figure {
 pub struct OutlineLayer {
     /// Name of the layer.
     pub name: String,
-    /// Its figures; never empty.
+    /// Its figures; never empty but where a mesh is still to be filled in.
     pub figures: Vec<Figure>,
     /// The ridge lines that it draws from the artwork.
     pub ridges: Vec<RidgePath>,

@@ -33,7 +33,8 @@ pub use control::{Rim, control};
 pub use crested::{Fineness, Skeleton, Subdivided, lower_walls, ridge_of};
 pub use distance::Segments;
 pub use drawn::{
-    Control, Course, CrestFault, DrawnCrest, DrawnSettings, control_over, drawn_path, drawn_surface,
+    Control, Course, CrestFault, DrawnCrest, DrawnSettings, control_over, drawn_path,
+    drawn_surface, levels,
 };
 pub use fields::{Rise, r_function, scan_lines};
 pub use halfplanes::{r_conjunction, r_disjunction};
@@ -51,9 +52,9 @@ pub use ridge::{Heights, Ridge};
 pub use ruled::{Density, RuledFault, check as check_ruled, mesh as ruled_mesh};
 pub use rungs::{Rungs, rungs};
 pub use subdivide::{
-    ClosedForm, CoonsMesh, CoonsRules, EvaluateError, Handle, IsoFault, LimitRows, LimitSurface,
-    MOST_FACES, PolyMesh, Sample, SpacedMesh, SubdivideError, Topology, adaptive, coons, iso_line,
-    limit, limit_rows, subdivide,
+    ClosedForm, CoonsMesh, CoonsRules, CreasedMesh, EvaluateError, Handle, IsoFault, LimitRows,
+    LimitSurface, MOST_FACES, PolyMesh, SHARP, Sample, SpacedMesh, SubdivideError, Topology,
+    adaptive, coons, iso_line, limit, limit_rows, subdivide,
 };
 
 use crate::geom::{Bounds, Grid, Tolerance};

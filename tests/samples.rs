@@ -19,12 +19,12 @@ fn name(sample: &Path) -> &str {
     sample.file_name().unwrap().to_str().unwrap()
 }
 
-/// The drawing or picture of a sample.
+/// The drawing, picture or mesh of a sample.
 fn artwork(sample: &Path) -> PathBuf {
-    let endings = ["svg", "png", "jpg"];
+    let endings = ["svg", "png", "jpg", "obj"];
     let all = endings.map(|e| sample.join(format!("{}.{e}", name(sample))));
     let found: Vec<_> = all.into_iter().filter(|p| p.is_file()).collect();
-    assert_eq!(found.len(), 1, "{}: one file of artwork, svg, png or jpg", sample.display());
+    assert_eq!(found.len(), 1, "{}: one file of artwork, svg, png, jpg or obj", sample.display());
     found[0].clone()
 }
 
@@ -114,6 +114,11 @@ fn leaf_carves() {
 #[test]
 fn scroll_carves() {
     carve(&samples().into_iter().find(|s| name(s) == "scroll").unwrap());
+}
+
+#[test]
+fn shell_carves() {
+    carve(&samples().into_iter().find(|s| name(s) == "shell").unwrap());
 }
 
 #[test]

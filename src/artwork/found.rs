@@ -46,6 +46,7 @@ impl Artwork {
             unit_mm: self.unit_mm,
             layers: layers.collect(),
             selectors,
+            meshes: Vec::new(),
         }
     }
 }

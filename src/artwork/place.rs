@@ -6,7 +6,7 @@ use kurbo::Affine;
 
 use super::boolean;
 use super::{Artwork, ArtworkError, FoundLayer, Part, Placed, Shape, colour_name, curve};
-use crate::geom::DVec2;
+use crate::geom::{Bounds, DVec2};
 use crate::job::{CourseSpec, LayerSpec, Rgb, Selector, SurfaceSpec};
 
 /// Most things that one message lists.
@@ -43,6 +43,11 @@ impl Artwork {
         unit_mm: f64,
         lower_left_mm: DVec2,
     ) -> Result<Placed, ArtworkError> {
+        if self.shapes.is_empty() {
+            // All layers are meshes.
+            let (layers, bounds) = (vec![Vec::new(); layers.len()], Bounds::EMPTY);
+            return Ok(Placed { shapes: Vec::new(), layers, bounds, notes: self.notes.clone() });
+        }
         let from = self.bounds();
         let side_mm = from.size().max_element() * unit_mm;
         if !(lower_left_mm.abs().max_element() <= 1e6 && (0.1..=10_000.0).contains(&side_mm)) {
@@ -63,7 +68,7 @@ impl Artwork {
         for layer in layers {
             let chosen: Vec<usize> =
                 (0..shapes.len()).filter(|i| shapes[*i].is_selected_by(&layer.select)).collect();
-            if chosen.is_empty() {
+            if chosen.is_empty() && layer.mesh().is_none() {
                 return Err(self.no_match(layer));
             }
             taken.push(chosen);

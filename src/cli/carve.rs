@@ -54,13 +54,20 @@ pub(super) fn run(args: &Args) -> Result<(), Stop> {
     spare_the_input(&args.input, &folder)?;
     memory::check(&input)?;
     let mut outputs = Outputs::prepare(&folder)?;
-    let carving = carve(input.draft, &input.artwork, &mut |stage| stages.enter(stage))
-        .map_err(|e| outcome::with_file(e, &input.artwork_file))?;
+    let carving =
+        carve(input.draft, &input.artwork, &input.models, &mut |stage| stages.enter(stage))
+            .map_err(|e| outcome::with_file(e, &input.artwork_file))?;
     if !carving.verdict.passed() {
         return Err(Stop::CheckFailed(outcome::failure(&carving, &outputs.earlier_programs()?)));
     }
     stages.enter("pictures");
-    let again = files::name_from(&folder, &input.artwork_file)?;
+    let mut again = carving.design.job.clone();
+    if again.artwork.is_given() {
+        again.artwork.file = files::name_from(&folder, &input.artwork_file)?;
+    }
+    for (mesh, file) in again.meshes_mut().zip(&input.model_files) {
+        mesh.file = files::name_from(&folder, file)?;
+    }
     let meshes = if args.meshes { Meshes::All } else { Meshes::Design };
     let (data, made) = outcome::outputs(&carving, &again, meshes)?;
     if args.debug_pictures {

@@ -18,7 +18,7 @@ pub(super) struct Args {
 pub(super) fn run(args: &Args) -> Result<(), Stop> {
     let input = inputs::load(&args.input)?;
     memory::check(&input)?;
-    let design = design(input.draft, &input.artwork, &mut |_| {})
+    let design = design(input.draft, &input.artwork, &input.models, &mut |_| {})
         .map_err(|e| outcome::with_file(e, &input.artwork_file))?;
     if args.quiet {
         return Ok(());

@@ -3,7 +3,8 @@
 use super::files;
 use crate::artwork::{Artwork, Fonts, is_picture, read_bitmap, read_svg};
 use crate::controller::Store;
-use crate::job::{ArtworkSpec, Draft, Library, Machine};
+use crate::job::{ArtworkSpec, Draft, Found, Library, Machine};
+use crate::model::Model;
 use anyhow::{Context, Result, anyhow, bail};
 use std::path::{Path, PathBuf};
 
@@ -12,8 +13,11 @@ use std::path::{Path, PathBuf};
 pub(super) struct Input {
     pub(super) draft: Draft,
     pub(super) artwork: Artwork,
-    /// The artwork's file, for messages.
+    /// The artwork's file, for messages; the job itself where every layer is a mesh.
     pub(super) artwork_file: PathBuf,
+    /// The meshes that its layers name, and their files.
+    pub(super) models: Vec<Model>,
+    pub(super) model_files: Vec<PathBuf>,
     pub(super) library: Library,
 }
 
@@ -28,7 +32,9 @@ pub(super) fn load(path: &Path) -> Result<Input> {
             let text = files::read_text(path)?;
             let load = |name: &str| std::fs::read_to_string(beside.join(name));
             let draft = Draft::from_toml(&text, &path.display().to_string(), &library, &load)?;
-            let file = beside.join(&draft.artwork().file);
+            let is_given = draft.artwork().is_given();
+            let file =
+                if is_given { beside.join(&draft.artwork().file) } else { path.to_path_buf() };
             (draft, file)
         }
         known if known == "svg" || known == "svgz" || ArtworkSpec::PICTURES.contains(&known) => {
@@ -41,11 +47,30 @@ pub(super) fn load(path: &Path) -> Result<Input> {
                 path.display()
             )
         }
+        "obj" => bail!(
+            "{}: a mesh is a layer of a job; write a file mesh.toml with the two lines [[layer]] and mesh = \"{}\" beside it \
+             and give that",
+            path.display(),
+            path.file_name().unwrap_or_default().to_string_lossy()
+        ),
         other => bail!(
             "{}: '.{other}' files are not read; give a job file (.toml) or artwork (.svg, .svgz, .png, .jpg)",
             path.display()
         ),
     };
+    let (model_files, models) = load_models(&draft, beside)?;
+    let input = |draft: Draft, artwork: Artwork| Input {
+        draft,
+        artwork,
+        artwork_file: artwork_file.clone(),
+        models,
+        model_files,
+        library,
+    };
+    if !draft.artwork().is_given() {
+        draft.refuse_picture_keys()?;
+        return Ok(input(draft, Artwork::none()));
+    }
     let bytes = match files::read(&artwork_file) {
         Err(e) if artwork_file != path => {
             return Err(draft.unreadable_artwork(&format!("{e:#}")).into());
@@ -56,7 +81,7 @@ pub(super) fn load(path: &Path) -> Result<Input> {
     if is_picture(&bytes) || draft.artwork().is_picture() {
         let artwork = read_bitmap(&bytes, draft.artwork())
             .with_context(|| artwork_file.display().to_string())?;
-        return Ok(Input { draft, artwork, artwork_file, library });
+        return Ok(input(draft, artwork));
     }
     draft.refuse_picture_keys()?;
     let dirs: Vec<PathBuf> = draft.artwork().font_dirs.iter().map(|d| beside.join(d)).collect();
@@ -66,7 +91,27 @@ pub(super) fn load(path: &Path) -> Result<Input> {
     }
     let fonts = if needs_fonts(&bytes) { load_fonts(&dirs) } else { Fonts::none() };
     let artwork = read_svg(&bytes, &fonts).with_context(|| artwork_file.display().to_string())?;
-    Ok(Input { draft, artwork, artwork_file, library })
+    Ok(input(draft, artwork))
+}
+
+impl Input {
+    /// What the job needs to know of what it names.
+    pub(super) fn found(&self) -> Found {
+        crate::found(&self.artwork, &self.models)
+    }
+}
+
+/// The meshes that a job names, with their files.
+fn load_models(draft: &Draft, beside: &Path) -> Result<(Vec<PathBuf>, Vec<Model>)> {
+    let (mut files, mut models) = (Vec::new(), Vec::new());
+    for (layer, spec) in draft.meshes() {
+        let path = beside.join(&spec.file);
+        let bytes =
+            files::read(&path).map_err(|e| draft.unreadable_mesh(layer, &format!("{e:#}")))?;
+        models.push(Model::read(&bytes, &path.display().to_string(), spec)?);
+        files.push(path);
+    }
+    Ok((files, models))
 }
 
 /// The built-in tables, overridden by `machines/*.toml` in `folder`.

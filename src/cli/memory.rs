@@ -13,7 +13,7 @@ const BYTES_PER_NODE: f64 = 40.0;
 /// Compares what the job will take with what the machine has free. Says nothing where that is not known.
 pub(super) fn check(input: &Input) -> Result<()> {
     let Some(free) = free_bytes() else { return Ok(()) };
-    let job = input.draft.clone().settle(&input.artwork.found())?;
+    let job = input.draft.clone().settle(&input.found())?;
     let nodes = relief::grid_of(&job)?.len();
     compare(nodes, free, job.relief.pitch_mm)
 }

@@ -56,18 +56,16 @@ pub(super) enum Meshes {
     All,
 }
 
-/// All files of the run, and the data of its report. `artwork` is how a job file beside them names the artwork.
+/// All files of the run, and the data of its report. `again` is the job that stands beside them.
 pub(super) fn outputs(
     carving: &Carving,
-    artwork: &str,
+    again: &Job,
     meshes: Meshes,
 ) -> Result<(ReportData, Vec<Made>), ReportError> {
     let mut files = drawn(carving, meshes)?;
     let mut data = report_data(carving);
     data.pictures = pictures(&files);
     files.push(("report.html".into(), report::html(&data).into_bytes()));
-    let mut again = carving.design.job.clone();
-    again.artwork.file = artwork.to_string();
     files.push(("job.toml".into(), again.to_toml().into_bytes()));
     files.extend(carving.programs.iter().map(|p| (p.name.clone(), p.text.clone().into_bytes())));
     Ok((data, files))
@@ -209,6 +207,18 @@ fn pictures(files: &[Made]) -> Vec<Picture> {
     ]
 }
 
+/// The files that the design was made from.
+fn sources(job: &Job) -> String {
+    let drawing = job.artwork.is_given().then_some(&job.artwork.file);
+    let mut files: Vec<&str> = drawing.into_iter().map(String::as_str).collect();
+    for mesh in job.layers.iter().filter_map(crate::job::LayerSpec::mesh) {
+        if !files.contains(&mesh.file.as_str()) {
+            files.push(&mesh.file);
+        }
+    }
+    files.join(", ")
+}
+
 fn report_data(carving: &Carving) -> ReportData {
     let design = &carving.design;
     let job = &design.job;
@@ -223,7 +233,7 @@ fn report_data(carving: &Carving) -> ReportData {
     };
     ReportData {
         title: job.title.clone(),
-        artwork: job.artwork.file.clone(),
+        artwork: sources(job),
         machine: job.machine.title.clone(),
         stock: StockFacts {
             width_mm: job.stock.width_mm,

@@ -86,7 +86,17 @@ pub(super) fn run(args: &Args) -> Result<(), Stop> {
     let input = inputs::load(path)?;
     let folder = args.out.clone().unwrap_or_else(|| default_folder(path));
     let with_file = |e: CarveError| outcome::with_file(e, &input.artwork_file);
-    let job = input.draft.without_travel_limits().settle(&input.artwork.found())?;
+    let found = input.found();
+    let job = input.draft.without_travel_limits().settle(&found)?;
+    let is_mesh = |layer: &&LayerSpec| {
+        layer.mesh().is_some() && args.layer.as_ref().is_none_or(|wanted| *wanted == layer.name)
+    };
+    if let Some(layer) = job.layers.iter().find(is_mesh) {
+        return Err(Stop::Usage(format!(
+            "layer '{}' is a mesh: there is no other surface of it to compare; name a layer of the artwork by --layer",
+            layer.name
+        )));
+    }
     let placed = input
         .artwork
         .place(&job.layers, job.artwork_unit_mm, job.artwork_lower_left_mm)

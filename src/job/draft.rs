@@ -78,7 +78,11 @@ impl Draft {
         let mut source = Source::new(file_name, text);
         let root = source.parse(text)?;
         let top = Table::check(&source, &TOP, "", 0..0, root.get_ref())?;
-        let artwork = read_artwork(&top)?;
+        let artwork = match top.raw("artwork") {
+            Some(_) => read_artwork(&top)?,
+            None if has_only_meshes(&top) => no_artwork(),
+            None => return Err(top.lacks("artwork")),
+        };
         let mut draft = read(&top, artwork, library, load)?;
         draft.source = source;
         Ok(draft)
@@ -92,14 +96,7 @@ impl Draft {
         let source = Source::default();
         let nothing = DeTable::new();
         let top = Table::unchecked(&source, &TOP, &nothing);
-        let artwork = ArtworkSpec {
-            file: file.to_owned(),
-            fit: Fit::Own,
-            at: Place::Center,
-            font_dirs: Vec::new(),
-            dpi: None,
-            trace: TraceSpec::default(),
-        };
+        let artwork = ArtworkSpec { file: file.to_owned(), ..no_artwork() };
         let mut draft = read(&top, artwork, library, &|_| Err(io::ErrorKind::NotFound.into()))
             .expect("the defaults are complete, and a library can only be added to");
         draft.source = Source::new(file, "");
@@ -259,8 +256,29 @@ pub(super) fn text_or_form<'a>(table: &Table<'a>, name: &str) -> Result<&'a str,
     }
 }
 
+/// Shapes come from the artwork; only a job of meshes does without.
+fn has_only_meshes(top: &Table<'_>) -> bool {
+    let layers = top.raw("layer").and_then(|layers| layers.get_ref().as_array());
+    let is_mesh = |layer: &toml::Spanned<DeValue<'_>>| {
+        layer.get_ref().as_table().is_some_and(|keys| keys.contains_key("mesh"))
+    };
+    layers.is_some_and(|layers| !layers.is_empty() && layers.iter().all(is_mesh))
+}
+
+/// For jobs whose layers are all meshes.
+fn no_artwork() -> ArtworkSpec {
+    ArtworkSpec {
+        file: String::new(),
+        fit: Fit::Own,
+        at: Place::Center,
+        font_dirs: Vec::new(),
+        dpi: None,
+        trace: TraceSpec::default(),
+    }
+}
+
 fn read_artwork(top: &Table<'_>) -> Result<ArtworkSpec, JobError> {
-    let table = top.table("artwork", &ARTWORK).expect("the key is required, and was checked")?;
+    let table = top.table("artwork", &ARTWORK).expect("the table is given")?;
     let (width, height, scale) =
         (table.number("width_mm"), table.number("height_mm"), table.number("scale"));
     let fit = match (width, height, scale) {
@@ -325,7 +343,7 @@ fn read_trace(table: &Table<'_>) -> Result<TraceSpec, JobError> {
     })
 }
 
-fn read_place(table: &Table<'_>) -> Result<Place, JobError> {
+pub(super) fn read_place(table: &Table<'_>) -> Result<Place, JobError> {
     let Some(value) = table.raw("at") else { return Ok(Place::Center) };
     match value.get_ref() {
         DeValue::String(word) if word == "center" => Ok(Place::Center),

@@ -79,7 +79,9 @@ fn read_group(group: &Table<'_>, layers: &[Table<'_>]) -> Result<GroupSpec, JobE
         return Err(group.impossible(name, message, "", help));
     }
     if matches!(combine, Combine::Add | Combine::Subtract | Combine::Multiply)
-        && let Some(layer) = layers[range.clone()].iter().find(|l| l.raw("height_mm").is_none())
+        && let Some(layer) = layers[range.clone()]
+            .iter()
+            .find(|l| l.raw("height_mm").is_none() && l.raw("mesh").is_none())
     {
         let message = format!(
             "a layer in a group that is combined by {} needs height_mm",

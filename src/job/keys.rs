@@ -138,6 +138,8 @@ pub(super) mod rule {
 /// Names of [`super::Origin`], in its order.
 pub(super) const ORIGINS: &[&str] =
     &["lower-left", "lower-right", "upper-left", "upper-right", "center"];
+/// Axes of a mesh that may point out of the wood.
+pub(super) const UPS: &[&str] = &["z", "y"];
 /// Names of [`super::Profile`], in its order.
 pub(super) const PROFILES: &[&str] = &["parabola", "round", "chamfer", "cove", "ogee", "bell"];
 /// Names of [`super::Combine`], in its order.
@@ -228,9 +230,9 @@ const fn key(name: &'static str, kind: Kind, default: Fallback, doc: &'static st
 use Fallback::{Flag, Number, Required, Rule, Text};
 
 /// The sections of a job, in the order in which they are written out.
-pub(super) static JOB: [&Section; 14] = [
+pub(super) static JOB: [&Section; 15] = [
     &TOP, &STOCK, &ARTWORK, &TRACE, &RELIEF, &TOLERANCE, &SAFETY, &KEEP_OUT, &LAYER, &SURFACE,
-    &SMOOTH, &CREST, &GROUP, &OPERATION,
+    &SMOOTH, &CREST, &MESH, &GROUP, &OPERATION,
 ];
 
 /// Top level of a job.
@@ -255,7 +257,12 @@ pub(super) static TOP: Section = Section {
             "refuse a program that leaves more wood than scallop_mm + gouge_mm where its cutters reach",
         ),
         key("stock", Kind::Forms("a [stock] table"), Rule("as below"), "the wood"),
-        key("artwork", Kind::Forms("an [artwork] table"), Required, "the drawing"),
+        key(
+            "artwork",
+            Kind::Forms("an [artwork] table"),
+            Rule("none, when every layer is a mesh"),
+            "the drawing",
+        ),
         key("relief", Kind::Forms("a [relief] table"), Rule("as below"), "the heightfield"),
         key("tolerance", Kind::Forms("a [tolerance] table"), Rule("as below"), "small numbers"),
         key("safety", Kind::Forms("a [safety] table"), Rule("as below"), "travel above the wood"),
@@ -578,8 +585,14 @@ pub(super) static LAYER: Section = Section {
             Kind::Forms(
                 "\"fill:#rrggbb\", \"stroke:#rrggbb\", \"label:...\", \"id:...\", \"layer:...\" or \"all\"",
             ),
-            Required,
+            Rule("none: mesh must be given"),
             "which shapes: fill:COLOUR, stroke:COLOUR, label:TEXT, id:TEXT, layer:TEXT or all",
+        ),
+        key(
+            "mesh",
+            Kind::Forms("the path of an OBJ file, or { file = \"shell.obj\", width_mm = 80, ... }"),
+            Rule("none: select must be given"),
+            "a control mesh (OBJ, polygons) in place of shapes: its Catmull-Clark surface is the layer",
         ),
         key(
             "surface",
@@ -708,6 +721,66 @@ pub(super) static CREST: Section = Section {
             "half the width of the strip that is level across the crest",
         ),
         key("sharp", Kind::Flag, Flag(false), "a sharp edge in place of the strip"),
+    ],
+};
+
+/// The table form of `layer.mesh`.
+pub(super) static MESH: Section = Section {
+    name: "mesh",
+    header: "mesh = { ... }",
+    doc: "a control mesh as a layer (inside a [[layer]]): its lowest point lies at the layer's base_mm, its highest at \
+          height_mm, by default as high as it is wide in the file",
+    keys: &[
+        key("file", Kind::Text, Required, "the OBJ file, seen from the job file's folder"),
+        key("part", Kind::Text, Rule("all of it"), "the object or group of the file that is taken"),
+        key(
+            "width_mm",
+            mm(0.1, LENGTH),
+            Rule("a unit of the file is 1 mm"),
+            "width (X) of the box around the surface",
+        ),
+        key(
+            "scale",
+            Kind::Number { min: 1e-6, max: 1e6, unit: "" },
+            Rule("1"),
+            "how many mm a unit of the file is: inches 25.4, metres 1000",
+        ),
+        key(
+            "at",
+            Kind::Forms("\"center\" or [x, y] in mm"),
+            Text("center"),
+            "\"center\" of the stock, or [x, y] of the lower left corner of the box, mm",
+        ),
+        key(
+            "rotate_deg",
+            deg(-360.0, 360.0),
+            Number(0.0),
+            "turned by this about Z, counter-clockwise, before it is placed",
+        ),
+        key(
+            "up",
+            Kind::Choice(UPS),
+            Text("z"),
+            "the axis of the file that points out of the wood (Blender writes \"y\" unless told otherwise)",
+        ),
+        key(
+            "levels",
+            Kind::Whole { min: 0, max: 8 },
+            Rule("until the edges are shorter than a cell"),
+            "how often it is subdivided; 0 carves its flat faces",
+        ),
+        key(
+            "crease_deg",
+            deg(1.0, 180.0),
+            Rule("none; creases of the file count in any case"),
+            "edges whose faces meet at more than this stay sharp",
+        ),
+        key(
+            "corner_deg",
+            deg(1.0, 180.0),
+            Rule("none; corners of the file count in any case"),
+            "vertices where the boundary turns by at least this stay corners",
+        ),
     ],
 };
 

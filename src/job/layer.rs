@@ -9,6 +9,7 @@ use super::crest::read_crests;
 use super::draft::{Draft, text_or_form};
 use super::error::{JobError, Source, nearest, shown};
 use super::keys::{DRAWN, Key, LAYER, METHODS, PROFILES, SLOPE_CAP, SURFACE, rule};
+use super::mesh::{mesh_name, read_mesh};
 use super::reader::{Table, as_number};
 use super::settle::{TOUCHING_MM, round};
 use super::smooth::read_smooth;
@@ -17,6 +18,7 @@ use super::surface::{
     SubdivisionSpec, SurfaceSpec,
 };
 use super::types::{Combine, Found, FoundLayer, LayerSpec, Rgb, Selector};
+use crate::geom::DVec2;
 
 /// A layer whose height may still be open.
 #[derive(Debug, Clone, PartialEq)]
@@ -37,8 +39,12 @@ impl LayerDraft {
 }
 
 impl Draft {
-    /// The layers with their heights.
-    pub(super) fn layers(&self, found: &Found) -> Result<Vec<LayerSpec>, JobError> {
+    /// The layers with their heights; `mesh_places`: lower left corners of those that are meshes.
+    pub(super) fn layers(
+        &self,
+        found: &Found,
+        mesh_places: &[DVec2],
+    ) -> Result<Vec<LayerSpec>, JobError> {
         let drafts = if self.layers.is_empty() {
             let mut layers = default_layers(&found.layers);
             if self.artwork.is_picture() {
@@ -57,7 +63,7 @@ impl Draft {
             return Err(self.impossible(&["artwork.file"], &message, help));
         }
         let count = drafts.len();
-        let layers: Vec<LayerSpec> = drafts
+        let mut layers: Vec<LayerSpec> = drafts
             .into_iter()
             .enumerate()
             .map(|(index, layer)| LayerSpec {
@@ -67,6 +73,7 @@ impl Draft {
                 ..layer.spec
             })
             .collect();
+        self.place_meshes(&mut layers, found, mesh_places)?;
         self.check_heights(&layers)?;
         Ok(layers)
     }
@@ -77,7 +84,8 @@ impl Draft {
         layer: &LayerSpec,
         there: &[Selector],
     ) -> Result<(), JobError> {
-        if layer.select == Selector::All || there.contains(&layer.select) {
+        if layer.select == Selector::All || layer.mesh().is_some() || there.contains(&layer.select)
+        {
             return Ok(());
         }
         let near = nearest_selector(&layer.select, there);
@@ -126,6 +134,16 @@ impl Draft {
 
 /// Reads a layer, of a drawing or of a picture, from a checked table.
 pub(super) fn read_layer(table: &Table<'_>, of_picture: bool) -> Result<LayerDraft, JobError> {
+    if let Some(mesh) = read_mesh(table)? {
+        let name = table.text("name").map_or_else(|| mesh_name(&mesh), str::to_owned);
+        let mut draft = layer(table, Selector::Mesh(mesh.file.clone()), name)?;
+        (draft.spec.draft_rad, draft.spec.slope_cap) = (0.0, f64::INFINITY);
+        draft.spec.surface = SurfaceSpec::Mesh(mesh);
+        return Ok(draft);
+    }
+    if table.raw("select").is_none() {
+        return Err(table.lacks("select"));
+    }
     let text = text_or_form(table, "select")?;
     let select = read_selector(table, text)?;
     let name = table.text("name").map_or_else(|| select.to_string(), str::to_owned);
@@ -147,7 +165,9 @@ fn default_layer(select: Selector, name: String) -> LayerDraft {
 fn layer(table: &Table<'_>, select: Selector, name: String) -> Result<LayerDraft, JobError> {
     let combine = combine_of(table);
     let height_mm = table.number("height_mm");
-    let relative = matches!(combine, Combine::Add | Combine::Subtract | Combine::Multiply);
+    // A mesh is as high as it is.
+    let relative = matches!(combine, Combine::Add | Combine::Subtract | Combine::Multiply)
+        && !matches!(select, Selector::Mesh(_));
     if height_mm.is_none() && relative {
         let message = format!(
             "a layer that is combined by {} needs height_mm",

@@ -17,6 +17,42 @@ const PIXEL_MM: f64 = 25.4 / 96.0;
 /// Artwork between these sizes is taken to be meant, mm.
 const ARTWORK_MM: (f64, f64) = (0.1, 10_000.0);
 
+/// Something that is laid on the stock: the artwork, or a mesh.
+#[derive(Debug, Clone)]
+pub(super) struct Laid {
+    /// What it is, for messages.
+    pub(super) what: String,
+    /// Size of its box, mm.
+    pub(super) size: DVec2,
+    pub(super) at: Place,
+    /// The keys of its size and its place, for messages.
+    pub(super) size_key: &'static str,
+    pub(super) at_key: &'static str,
+    /// Where its place and its size stand in the job.
+    pub(super) paths: Vec<String>,
+}
+
+impl Laid {
+    fn artwork(size: DVec2, at: Place) -> Self {
+        Self {
+            what: "the artwork".to_owned(),
+            size,
+            at,
+            size_key: "artwork.width_mm",
+            at_key: "artwork.at",
+            paths: vec!["artwork.at".to_owned()],
+        }
+    }
+
+    /// Where its size along an axis stands.
+    fn size_paths(&self, axis: usize) -> Vec<&str> {
+        match self.paths.len() {
+            1 => vec![["artwork.width_mm", "artwork.height_mm"][axis]],
+            _ => self.paths[1..].iter().map(String::as_str).collect(),
+        }
+    }
+}
+
 impl Draft {
     /// Fills in all that hangs on the artwork and checks the job as a whole.
     ///
@@ -25,21 +61,34 @@ impl Draft {
     /// selects what the artwork does not have.
     pub fn settle(self, found: &Found) -> Result<Job, JobError> {
         let mut notes = Vec::new();
-        let (unit_mm, size) = self.artwork_size(found, &mut notes)?;
+        let (unit_mm, size) = if self.artwork.is_given() {
+            self.artwork_size(found, &mut notes)?
+        } else {
+            (1.0, DVec2::ZERO)
+        };
         let background = self.background();
-        let stock = self.stock(size, background);
+        let drawing = self.artwork.is_given().then(|| Laid::artwork(size, self.artwork.at));
+        let laid: Vec<Laid> = drawing.into_iter().chain(self.laid_meshes(found)?).collect();
+        let stock = self.stock(&laid, background);
         let bounds = stock.bounds();
-        let lower_left = match self.artwork.at {
+        let corner = |size: DVec2, at: Place| match at {
             Place::Center => bounds.center() - size * 0.5,
             Place::LowerLeft(point) => point,
         };
-        self.check_place(&stock, Bounds::new(lower_left, lower_left + size), background)?;
+        let lower_left = corner(size, self.artwork.at);
+        let places: Vec<DVec2> = laid.iter().map(|one| corner(one.size, one.at)).collect();
+        self.check_place(&stock, &laid, &places, background)?;
         self.check_depth(&stock, &mut notes)?;
         let pitch_mm = self.pitch(&stock)?;
-        let layers = self.layers(found)?;
+        let drawings = usize::from(self.artwork.is_given());
+        let layers = self.layers(found, &places[drawings..])?;
         let operations = self.operations(&stock, pitch_mm, &layers, &mut notes)?;
         Ok(Job {
-            title: self.title.clone().unwrap_or_else(|| stem(&self.artwork.file)),
+            title: self.title.clone().unwrap_or_else(|| {
+                let mesh = self.meshes().next().map(|(_, mesh)| mesh.file.as_str());
+                let file = Some(self.artwork.file.as_str()).filter(|file| !file.is_empty());
+                stem(file.or(mesh).unwrap_or_default())
+            }),
             relief: ReliefSpec { pitch_mm, depth_mm: self.depth_mm, background },
             stock,
             layers,
@@ -173,16 +222,16 @@ impl Draft {
     }
 
     /// The stock; a size that is not given leaves the margin round the artwork, inside the frame.
-    fn stock(&self, artwork: DVec2, background: Background) -> Stock {
+    fn stock(&self, laid: &[Laid], background: Background) -> Stock {
         let frame = match background {
             Background::Frame(frame) => frame,
             Background::Clear | Background::Leave(_) => 0.0,
         };
         let margin = rule::MARGIN_MM + frame;
-        let needed = match (self.artwork.at, self.stock.origin) {
-            (Place::Center, _) => artwork + DVec2::splat(2.0 * margin),
+        let needs = |one: &Laid| match (one.at, self.stock.origin) {
+            (Place::Center, _) => one.size + DVec2::splat(2.0 * margin),
             (Place::LowerLeft(point), Origin::Point(zero)) => {
-                (zero + point + artwork + DVec2::splat(margin)).max(DVec2::ONE)
+                (zero + point + one.size + DVec2::splat(margin)).max(DVec2::ONE)
             }
             (Place::LowerLeft(point), origin) => {
                 let zero = origin.of(DVec2::ONE);
@@ -191,10 +240,11 @@ impl Draft {
                 let axis = |low: f64, high: f64, zero: f64| {
                     side(margin - low, zero).max(side(high + margin, 1.0 - zero)).max(1.0)
                 };
-                let far = point + artwork;
+                let far = point + one.size;
                 DVec2::new(axis(point.x, far.x, zero.x), axis(point.y, far.y, zero.y))
             }
         };
+        let needed = laid.iter().map(needs).fold(DVec2::ONE, DVec2::max);
         let step = rule::STOCK_STEP_MM;
         // A thousandth of a step is round-off of the artwork's single-precision curves. Divided by a whole
         // number, so that 170 stays 170.
@@ -209,17 +259,15 @@ impl Draft {
         }
     }
 
-    /// The artwork lies on the stock, the stock on the machine.
+    /// Artwork and meshes lie on the stock, the stock on the machine.
     fn check_place(
         &self,
         stock: &Stock,
-        artwork: Bounds,
+        laid: &[Laid],
+        places: &[DVec2],
         background: Background,
     ) -> Result<(), JobError> {
-        const STOCK_KEYS: [[&str; 3]; 2] = [
-            ["stock.width_mm", "artwork.width_mm", "artwork.at"],
-            ["stock.height_mm", "artwork.height_mm", "artwork.at"],
-        ];
+        const STOCK_KEYS: [&str; 2] = ["stock.width_mm", "stock.height_mm"];
         let bounds = stock.bounds();
         let frame = match background {
             Background::Frame(frame) => frame,
@@ -227,41 +275,56 @@ impl Draft {
         };
         let inner = bounds.grown(-frame);
         let travel = self.machine.travel_mm.truncate();
-        for (axis, keys) in STOCK_KEYS.iter().enumerate() {
+        let mut all = Bounds::EMPTY;
+        for ((axis, stock_key), (one, place)) in (0..2)
+            .zip(STOCK_KEYS)
+            .flat_map(|key| laid.iter().zip(places).map(move |one| (key, one)))
+        {
             let name = ["X", "Y"][axis];
-            let (size, room) = (artwork.size()[axis], bounds.size()[axis]);
+            let Laid { what, size_key, at_key, .. } = one;
+            let own = Bounds::new(*place, *place + one.size);
+            all = all.union(&own);
+            let (at, size_keys) = (one.paths[0].as_str(), one.size_paths(axis));
+            let (size, room) = (own.size()[axis], bounds.size()[axis]);
             if size > room + TOUCHING_MM {
                 let message = format!(
-                    "the artwork is {} mm long in {name}, the stock only {} mm",
+                    "{what} is {} mm long in {name}, the stock only {} mm",
                     round(size),
                     round(room)
                 );
-                let help = "give a smaller artwork.width_mm or a larger stock";
-                return Err(self.impossible(keys, &message, help));
+                let help = format!("give a smaller {size_key} or a larger stock");
+                let keys: Vec<&str> =
+                    [stock_key].into_iter().chain(size_keys).chain([at]).collect();
+                return Err(self.impossible(&keys, &message, &help));
             }
-            let over = (bounds.min - artwork.min)[axis].max((artwork.max - bounds.max)[axis]);
+            let over = (bounds.min - own.min)[axis].max((own.max - bounds.max)[axis]);
             if over > TOUCHING_MM {
                 let message =
-                    format!("the artwork sticks out of the stock by {} mm in {name}", round(over));
+                    format!("{what} sticks out of the stock by {} mm in {name}", round(over));
                 let help = format!(
-                    "the stock reaches from {} to {} in {name}; change artwork.at",
+                    "the stock reaches from {} to {} in {name}; change {at_key}",
                     round(bounds.min[axis]),
                     round(bounds.max[axis])
                 );
-                return Err(self.impossible(&["artwork.at", keys[0]], &message, &help));
+                return Err(self.impossible(&[at, stock_key], &message, &help));
             }
-            let under = (inner.min - artwork.min)[axis].max((artwork.max - inner.max)[axis]);
+            let under = (inner.min - own.min)[axis].max((own.max - inner.max)[axis]);
             if under > TOUCHING_MM {
                 let message = format!(
-                    "the frame of {frame} mm covers {} mm of the artwork in {name}",
+                    "the frame of {frame} mm covers {} mm of {what} in {name}",
                     round(under)
                 );
                 let help = "take a narrower frame_mm, smaller artwork or a larger stock";
-                return Err(self.impossible(&["relief.background", keys[0]], &message, help));
+                return Err(self.impossible(&["relief.background", stock_key], &message, help));
             }
+        }
+        for ((axis, stock_key), size_key) in
+            (0..2).zip(STOCK_KEYS).zip(["artwork.width_mm", "artwork.height_mm"])
+        {
+            let (name, room) = (["X", "Y"][axis], bounds.size()[axis]);
             let reach = match background {
                 Background::Clear | Background::Frame(_) => room,
-                Background::Leave(leave) => room.min(size + 2.0 * leave),
+                Background::Leave(leave) => room.min(all.size()[axis] + 2.0 * leave),
             };
             if reach > travel[axis] + TOUCHING_MM {
                 let message = format!(
@@ -270,9 +333,14 @@ impl Draft {
                     travel[axis],
                     round(reach)
                 );
-                let help = "give a smaller artwork.width_mm, a smaller stock, background = \"leave\", or another machine";
-                let paths = [keys[0], keys[1], "machine", "artwork.scale", "artwork.file"];
-                return Err(self.impossible(&paths, &message, help));
+                let size = laid.first().map_or("artwork.width_mm", |one| one.size_key);
+                let help = format!(
+                    "give a smaller {size}, a smaller stock, background = \"leave\", or another machine"
+                );
+                let mesh = laid.iter().flat_map(|one| &one.paths[1..]).map(String::as_str);
+                let paths = [stock_key, size_key, "machine", "artwork.scale", "artwork.file"];
+                let paths: Vec<&str> = paths.into_iter().chain(mesh).collect();
+                return Err(self.impossible(&paths, &message, &help));
             }
         }
         Ok(())
@@ -333,7 +401,7 @@ impl Draft {
 }
 
 /// File name without folders and ending.
-fn stem(file: &str) -> String {
+pub(super) fn stem(file: &str) -> String {
     let base = file.rsplit(['/', '\\']).next().unwrap_or(file);
     let stem = base.rsplit_once('.').map_or(base, |(stem, _)| stem);
     if stem.trim().is_empty() { "carving".to_owned() } else { stem.to_owned() }

@@ -1,5 +1,6 @@
 //! The types of a layer's surface: its method, and how skeletons, control meshes and cross-sections are made.
 
+use super::mesh::MeshSpec;
 use super::types::Selector;
 
 /// How a layer's surface is made from its outline.
@@ -50,6 +51,8 @@ pub enum SurfaceSpec {
     /// A surface over ridge lines that the artwork or the job draws: `[[layer.crest]]`.
     #[serde(rename = "crest")]
     Drawn(DrawnSpec),
+    /// The limit surface of a control mesh from a file.
+    Mesh(MeshSpec),
     /// A subdivision surface over a control mesh (methods A and A+).
     #[serde(untagged)]
     Subdivision(SubdivisionSpec),
@@ -59,7 +62,10 @@ impl SurfaceSpec {
     /// What its crest is made with, if it has one.
     pub fn crest(&self) -> Option<&CrestSpec> {
         match self {
-            Self::Profile { .. } | Self::RFunction { .. } | Self::ScanLines { .. } => None,
+            Self::Profile { .. }
+            | Self::RFunction { .. }
+            | Self::ScanLines { .. }
+            | Self::Mesh(_) => None,
             Self::Ruled(crest)
             | Self::Ratio(crest)
             | Self::Harmonic(crest)
@@ -73,7 +79,10 @@ impl SurfaceSpec {
     /// The same, to be changed.
     pub(super) fn crest_mut(&mut self) -> Option<&mut CrestSpec> {
         match self {
-            Self::Profile { .. } | Self::RFunction { .. } | Self::ScanLines { .. } => None,
+            Self::Profile { .. }
+            | Self::RFunction { .. }
+            | Self::ScanLines { .. }
+            | Self::Mesh(_) => None,
             Self::Ruled(crest)
             | Self::Ratio(crest)
             | Self::Harmonic(crest)
@@ -96,6 +105,7 @@ impl SurfaceSpec {
             Self::ScanLines { .. } => "scan-lines",
             Self::Patches { .. } => "patches",
             Self::Drawn(_) => "crest",
+            Self::Mesh(_) => "mesh",
             Self::Subdivision(subdivision) => subdivision.scheme.name(),
         }
     }

@@ -2,6 +2,7 @@
 
 mod crests;
 mod faults;
+mod meshes;
 mod written;
 
 use std::io;
@@ -41,7 +42,7 @@ fn found() -> Found {
         Selector::Label("petals".to_owned()),
         Selector::Id("leaf".to_owned()),
     ];
-    Found { size: DVec2::new(200.0, 100.0), unit_mm: None, layers, selectors }
+    Found { size: DVec2::new(200.0, 100.0), unit_mm: None, layers, selectors, meshes: vec![] }
 }
 
 fn job(text: &str) -> Result<Job, JobError> {

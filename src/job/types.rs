@@ -61,6 +61,8 @@ pub struct Found {
     pub layers: Vec<FoundLayer>,
     /// Every selector that takes at least one shape ([`Selector::All`] aside).
     pub selectors: Vec<Selector>,
+    /// The sizes of the meshes that the layers name, in their order, in units of their files.
+    pub meshes: Vec<DVec3>,
 }
 
 /// One layer found in the artwork.
@@ -191,7 +193,7 @@ pub struct Wood {
 /// Where the artwork comes from and where it lies.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct ArtworkSpec {
-    /// File name as written in the job (or given on the command line).
+    /// File name as written in the job (or given on the command line); empty: there is none, every layer is a mesh.
     pub file: String,
     /// How its size is found.
     pub fit: Fit,
@@ -208,6 +210,11 @@ pub struct ArtworkSpec {
 impl ArtworkSpec {
     /// Endings of the files that are taken to be pictures, lower case.
     pub const PICTURES: [&str; 3] = ["png", "jpg", "jpeg"];
+
+    /// False when every layer is a mesh and there is no drawing.
+    pub fn is_given(&self) -> bool {
+        !self.file.is_empty()
+    }
 
     /// True when the file's ending is that of a picture.
     pub fn is_picture(&self) -> bool {
@@ -369,6 +376,8 @@ pub enum Selector {
     Id(String),
     /// Shapes in the Inkscape layer (`groupmode = layer`) with this label.
     Layer(String),
+    /// No shape: the layer is the mesh of this file.
+    Mesh(String),
 }
 
 impl std::fmt::Display for Selector {
@@ -380,6 +389,7 @@ impl std::fmt::Display for Selector {
             Self::Label(s) => write!(f, "label:{s}"),
             Self::Id(s) => write!(f, "id:{s}"),
             Self::Layer(s) => write!(f, "layer:{s}"),
+            Self::Mesh(s) => write!(f, "mesh:{s}"),
         }
     }
 }

@@ -11,6 +11,7 @@ use super::keys::{
     STOCK, SURFACE, Section, TOLERANCE, TOP, TRACE, TRACE_METHODS, WOOD, rule,
 };
 use super::library::Library;
+use super::mesh::mesh_lines;
 use super::smooth::smooth_lines;
 use super::surface::{CourseSpec, DrawnCrestSpec, DrawnSpec, Prune, SkeletonSpec, SurfaceSpec};
 use super::types::{
@@ -41,7 +42,9 @@ impl Job {
         section("[machine]", &machine_lines(&self.machine));
         section("[stock]", &stock_lines(self));
         section("[stock.wood]", &wood_lines(&self.stock.wood));
-        section("[artwork]", &artwork_lines(self));
+        if self.artwork.is_given() {
+            section("[artwork]", &artwork_lines(self));
+        }
         if self.artwork.is_picture() {
             section("[artwork.trace]", &trace_lines(&self.artwork.trace));
         }
@@ -374,6 +377,8 @@ fn surface_lines(surface: &SurfaceSpec, of_picture: bool) -> Vec<Line> {
                 ("order", order.to_string()),
             ];
         }
+        // Its own key of the layer tells it.
+        SurfaceSpec::Mesh(_) => return Vec::new(),
         SurfaceSpec::ScanLines { directions, profile } => {
             return vec![
                 ("method", quoted("scan-lines")),
@@ -477,6 +482,18 @@ fn crest_lines(crest: &DrawnCrestSpec) -> Vec<Line> {
 fn layer_lines(layer: &LayerSpec, of_picture: bool) -> Vec<Line> {
     let surface = surface_lines(&layer.surface, of_picture);
     debug_assert!(surface.iter().all(|(name, _)| SURFACE.key(name).is_some()));
+    if let Some(mesh) = layer.mesh() {
+        return vec![
+            ("name", quoted(&layer.name)),
+            ("mesh", inline(&mesh_lines(mesh))),
+            ("base_mm", number(layer.base_mm)),
+            ("height_mm", number(layer.height_mm)),
+            ("offset_mm", number(layer.offset_mm)),
+            ("combine", quoted(layer.combine.name())),
+            ("blend_mm", number(layer.blend_mm)),
+            ("feather_mm", number(layer.feather_mm)),
+        ];
+    }
     let smooth = layer.smooth.as_ref().map_or(quoted("none"), |s| inline(&smooth_lines(s)));
     let cap = if layer.slope_cap.is_finite() { number(layer.slope_cap) } else { quoted("none") };
     vec![

@@ -11,7 +11,7 @@ use super::{Figure, OutlineError, OutlineLayer, Outlines, RidgePath};
 use crate::artwork::boolean::{self, FixedGrid, NodeRing};
 use crate::artwork::{FillRule, Part, Placed, Shape, curve};
 use crate::geom::edge_grid::EdgeGrid;
-use crate::geom::{DVec2, Tolerance, bounds_of};
+use crate::geom::{Bounds, DVec2, Tolerance, bounds_of};
 use crate::job::{CourseSpec, LayerSpec, SurfaceSpec};
 
 /// Most chords that one shape is flattened into.
@@ -27,6 +27,8 @@ const MAX_CROSSINGS: usize = 200_000;
 /// Turns the shapes of every layer into regions: flattened to within `chord_mm` (or smoothed), resolved by their own fill
 /// rules, parted where they touch, oriented, nested. Each shape is a figure of its own unless the layer's
 /// `union` melts them; with `visible` a layer keeps only what no later shape of the artwork covers.
+///
+/// Layers that are meshes get no figure here.
 ///
 /// Parts and holes smaller than a square of `chord_mm` are left out, with a note.
 ///
@@ -44,6 +46,11 @@ pub fn trace(
     let tracer = Tracer::new(placed, layers, chord_mm)?;
     let mut out = Outlines { layers: Vec::with_capacity(layers.len()), notes: Vec::new() };
     for (index, (layer, indices)) in layers.iter().zip(&placed.layers).enumerate() {
+        if layer.mesh().is_some() {
+            let (figures, ridges) = (Vec::new(), Vec::new());
+            out.layers.push(OutlineLayer { name: layer.name.clone(), figures, ridges });
+            continue;
+        }
         let (mut traced, notes) = tracer.layer(index, layer, indices)?;
         traced.ridges = ridges(placed, layer, chord_mm)?;
         out.layers.push(traced);
@@ -193,6 +200,8 @@ impl<'a> Tracer<'a> {
         // A smoothed outline may swing out of what was drawn.
         let swung = flats.iter().filter(|flat| flat.smoothed.is_some()).flat_map(|f| &f.rings);
         let bounds = swung.fold(placed.bounds, |all, ring| all.union(&bounds_of(ring)));
+        // Without any shape there is nothing to cover.
+        let bounds = if bounds.is_empty() { Bounds::new(DVec2::ZERO, DVec2::ONE) } else { bounds };
         let grid = FixedGrid::covering(&bounds);
         let each: Vec<Resolved> = needed
             .par_iter()

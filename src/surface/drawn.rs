@@ -134,7 +134,7 @@ pub fn drawn_surface(
 }
 
 /// How many times a mesh is refined until its edges are shorter than a cell, as long as it does not get too large.
-pub(super) fn levels(mesh: &PolyMesh, cell_mm: f64) -> u32 {
+pub fn levels(mesh: &PolyMesh, cell_mm: f64) -> u32 {
     let at = |v: u32| mesh.vertices[v as usize].truncate();
     let sides = mesh.faces().flat_map(|f| f.iter().zip(f.iter().cycle().skip(1)));
     let longest = sides.map(|(&a, &b)| at(a).distance(at(b))).fold(0.0, f64::max);

@@ -76,7 +76,7 @@ pub(super) fn prepare(args: &Args, enter: &mut dyn FnMut(&str)) -> Result<Ready,
         notes.push(format!("held against the job beside the programs, {}", job_file.display()));
     }
     let input = inputs::load(&job_file)?;
-    let design = design(input.draft, &input.artwork, enter)
+    let design = design(input.draft, &input.artwork, &input.models, enter)
         .map_err(|e| outcome::with_file(e, &input.artwork_file))?;
     let mut job = design.job;
     override_by_flags(args, &mut job, &input.library)?;

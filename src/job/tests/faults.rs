@@ -318,7 +318,13 @@ fn operations_that_cannot_be_done_are_refused() {
 
 #[test]
 fn artwork_that_holds_nothing_is_refused() {
-    let nothing = Found { size: DVec2::ZERO, unit_mm: None, layers: vec![], selectors: vec![] };
+    let nothing = Found {
+        size: DVec2::ZERO,
+        unit_mm: None,
+        layers: vec![],
+        selectors: vec![],
+        meshes: vec![],
+    };
     let error = draft(&with("")).unwrap().settle(&nothing).unwrap_err();
     assert_eq!((error.line(), error.column()), (Some(2), Some(8)));
     for size in [DVec2::new(0.0, 5.0), DVec2::NAN, DVec2::INFINITY, DVec2::NEG_INFINITY] {

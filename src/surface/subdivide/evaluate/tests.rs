@@ -164,6 +164,57 @@ fn the_matrix_is_as_tabled() {
     assert!(form.weights(0.0, 0.0).is_none() && form.weights(f64::NAN, 0.5).is_none());
 }
 
+/// How many pivots vanish when a multiple of the identity is taken from a square matrix: the dimension of its eigenspace.
+fn nullity(matrix: &[Vec<f64>], lambda: f64) -> usize {
+    let n = matrix.len();
+    let mut rows: Vec<Vec<f64>> = matrix.to_vec();
+    (0..n).for_each(|k| rows[k][k] -= lambda);
+    for step in 0..n {
+        let places = (step..n).flat_map(|i| (step..n).map(move |j| (i, j)));
+        let size = |&(i, j): &(usize, usize)| rows[i][j].abs();
+        let best = places.max_by(|a, b| size(a).total_cmp(&size(b))).unwrap();
+        if rows[best.0][best.1].abs() < 1e-7 {
+            return n - step;
+        }
+        rows.swap(step, best.0);
+        rows.iter_mut().for_each(|row| row.swap(step, best.1));
+        for i in step + 1..n {
+            let part = rows[i][step] / rows[step][step];
+            for j in step..n {
+                rows[i][j] -= part * rows[step][j];
+            }
+        }
+    }
+    0
+}
+
+/// Section 3.4: 1 once, the subdominant one (3.2) twice; the seven points beyond the ring by themselves bring 1/8, 1/8,
+/// 1/16, 1/16, 1/32, 1/32, 1/64, whatever the valence. The sums of their first seven powers tell seven numbers.
+#[test]
+fn the_matrix_has_the_tabled_eigenvalues() {
+    let tabled = [0.410097051, 0.5, 0.549988355, 0.579682326, 0.598510283, 0.611116527];
+    for (n, second) in (3..).zip(tabled) {
+        let form = ClosedForm::of(n).unwrap();
+        let matrix = form.corner();
+        assert_eq!(nullity(matrix, 1.0), 1, "{n}");
+        assert_eq!(nullity(matrix, second), 2, "{n}");
+        assert_eq!(nullity(matrix, 0.9), 0, "{n}");
+        let a = 2 * n + 1;
+        assert!(matrix[..a].iter().all(|row| row[a..].iter().all(|part| *part == 0.0)), "{n}");
+        let beyond: Vec<&[f64]> = matrix[a..].iter().map(|row| &row[a..]).collect();
+        let mut power: Vec<Vec<f64>> = beyond.iter().map(|row| row.to_vec()).collect();
+        for k in 1..=7 {
+            let trace: f64 = (0..7).map(|i| power[i][i]).sum();
+            let want: f64 =
+                [8.0, 8.0, 16.0, 16.0, 32.0, 32.0, 64.0_f64].map(|d| d.powi(-k)).iter().sum();
+            assert!((trace - want).abs() < 1e-15, "{n} {k}: {trace} {want}");
+            power = (power.iter())
+                .map(|row| (0..7).map(|j| (0..7).map(|m| row[m] * beyond[m][j]).sum()).collect())
+                .collect();
+        }
+    }
+}
+
 /// Refinement and closed form give the same weights; these sum up to 1, those of derivatives to 0.
 #[test]
 fn both_evaluations_agree() {
