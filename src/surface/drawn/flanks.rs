@@ -138,7 +138,9 @@ impl Flanks {
         }
         for face in mesh.mesh().faces() {
             if face.iter().any(|&v| round[v as usize]) {
-                face.iter().for_each(|&v| held[v as usize] = true);
+                for &v in face {
+                    held[v as usize] = true;
+                }
             }
         }
         Ok(held)

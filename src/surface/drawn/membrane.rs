@@ -61,7 +61,9 @@ impl Level {
         let mut out = own.to_vec();
         for (of, x) in self.parents().zip(more) {
             let part = x / of.len() as f64;
-            of.iter().for_each(|&v| out[v as usize] += part);
+            for &v in of {
+                out[v as usize] += part;
+            }
         }
         out
     }
@@ -158,7 +160,9 @@ impl Membrane {
             x.iter_mut().zip(&along).for_each(|(x, along)| *x += by * along);
             residual.iter_mut().zip(&image).for_each(|(residual, image)| *residual -= by * image);
         }
-        x.iter_mut().for_each(|x| *x = x.clamp(low, high));
+        for x in x {
+            *x = x.clamp(low, high);
+        }
     }
 
     /// Where to go by a residual: the sum over all levels of its part there over their links.
