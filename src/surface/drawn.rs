@@ -2,18 +2,22 @@
 //!
 //! ```text
 //!   DrawnCrest --line--> polylines with heights --arms--> pieces between joints, each a cubic NURBS curve
-//!     --strips--> three rows of vertices along each piece (or a crease) --fill--> the rest of the outline
-//!     --SpacedMesh--> refined until its edges are shorter than a cell --> Mesh
+//!     --strips--> three rows of vertices along each piece (or a crease) --fill--> the rest of the outline in plan
+//!     --flanks--> heights between crests and outline, again on each refinement, as long as equations can be solved
+//!     --SpacedMesh--> refined until its edges are as short as a cell --> Mesh
 //! ```
 //! Non-uniform Catmull-Clark surfaces hold a cubic NURBS curve when the mesh has a symmetric strip along its control
 //! polygon (Zhang, Wang and Zheng 2003). How strips are joined, embedded and surrounded is this project's own: what lies
 //! between them and the outline is a constrained Delaunay triangulation whose triangles are paired, so that no face of
-//! the control mesh is turned over whatever the outline.
+//! the control mesh is turned over whatever the outline. Its faces say nothing about the shape of the flanks: a crest
+//! needs no more than the vertices next to it, at any level, so that all others get heights of their own there.
 
 mod arms;
 mod faults;
 mod fill;
+mod flanks;
 mod line;
+mod membrane;
 mod raise;
 mod spline;
 mod strips;
@@ -28,8 +32,8 @@ use crate::geom::DVec3;
 use crate::job::Profile;
 use crate::outline::Region;
 
-/// Longest edge of the finest mesh, in cells.
-const EDGE_CELLS: f64 = 0.7;
+/// Longest edge of the finest mesh, in cells: its vertices lie on the limit surface, which hardly bends on that way.
+const EDGE_CELLS: f64 = 1.4;
 /// Most levels, and most faces that these may lead to.
 const MOST_LEVELS: u32 = 7;
 const MOST_FACES: usize = 1 << 20;
@@ -64,6 +68,7 @@ pub struct Control {
     pub mesh: SpacedMesh,
     /// The crests as the limit surface holds them: points of each piece, mm.
     pub crests: Vec<Vec<DVec3>>,
+    flanks: flanks::Flanks,
 }
 
 /// Edge of the control mesh over a region, mm.
@@ -92,7 +97,7 @@ pub fn control_over(
     loop {
         let strips = strips::strips(&lines, &net, region, part, settings)?;
         match fill::fill(&strips, region, edge_mm, settings) {
-            Ok(mesh) => return Ok(Control { mesh, crests }),
+            Ok((mesh, flanks)) => return Ok(Control { mesh, crests, flanks }),
             Err(fault) if part <= LEAST_PART => return Err(fault),
             Err(_) => part *= 0.5,
         }
@@ -117,11 +122,13 @@ pub fn drawn_surface(
     settings: &DrawnSettings,
     remarks: &mut Vec<Remark>,
 ) -> Result<(Vec<Mesh>, Vec<Vec<DVec3>>), CrestFault> {
-    let Control { mesh, crests } = control_over(region, crests, settings)?;
+    let Control { mesh, crests, flanks } = control_over(region, crests, settings)?;
     let levels = levels(&mesh.projected(), settings.cell_mm);
     let at = region.bounds().center();
-    let fine = mesh.refined(levels).and_then(|fine| fine.settled());
-    let fine = fine.map_err(|why| CrestFault::Mesh { at, why })?;
+    let fine = flanks
+        .refined(&mesh, levels)
+        .and_then(|(fine, done)| fine.refined(levels - done)?.settled())
+        .map_err(|why| CrestFault::Mesh { at, why })?;
     let mut mesh = fine.to_triangles();
     let folds = mesh.take_folds();
     let first = folds.faces.first().map(|f| folds.vertices[f[0] as usize].truncate());
@@ -133,7 +140,7 @@ pub fn drawn_surface(
     Ok((meshes, crests))
 }
 
-/// How many times a mesh is refined until its edges are shorter than a cell, as long as it does not get too large.
+/// How many times a mesh is refined until its edges are as short as a cell, as long as it does not get too large.
 pub fn levels(mesh: &PolyMesh, cell_mm: f64) -> u32 {
     let at = |v: u32| mesh.vertices[v as usize].truncate();
     let sides = mesh.faces().flat_map(|f| f.iter().zip(f.iter().cycle().skip(1)));

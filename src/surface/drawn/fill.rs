@@ -1,20 +1,19 @@
-//! Strips and an outline -> the whole control mesh: points between them, paired triangles, heights.
+//! Strips and an outline -> the whole control mesh: points between them, paired triangles.
 //!
 //! ```text
 //!   outline (a cubic B-spline through its own points) + strips + a lattice of points in between
 //!     --constrained Delaunay triangles--> those between outline and strips --pairs--> quadrilaterals, some triangles
-//!   heights: Laplace's equation on the edges of this mesh, twice: u from 0 on the outline to 1 on the crests, and
-//!   the crests' heights carried outwards; then base + (height - base) profile(u)
 //! ```
 
+use super::flanks::Flanks;
 use super::spline::{Condition, Spline};
 use super::strips::Strips;
 use super::{CrestFault, DrawnSettings};
 use crate::geom::{DVec2, contains_even_odd, distance_to_segment, orient};
 use crate::outline::Region;
 use crate::skeleton::{Curve, resampled};
+use crate::surface::Segments;
 use crate::surface::subdivide::{PolyMesh, SpacedMesh};
-use crate::surface::{Segments, profile_at};
 use spade::{ConstrainedDelaunayTriangulation, Point2, Triangulation as _};
 use std::collections::{HashMap, HashSet};
 
@@ -26,9 +25,6 @@ const LEAST_SQUARE_DEG: f64 = 65.0;
 const FINER: u32 = 5;
 /// Least vertices of a ring.
 const LEAST_VERTICES: f64 = 8.0;
-/// Rounds of the relaxation of heights, and its step.
-const ROUNDS: usize = 400;
-const STEP: f64 = 1.7;
 
 /// The control points of one ring of the outline.
 struct Rim {
@@ -37,13 +33,13 @@ struct Rim {
     base_mm: f64,
 }
 
-/// The mesh over a region with these strips.
+/// The mesh over a region with these strips, and what its heights follow from.
 pub(super) fn fill(
     strips: &Strips,
     region: &Region,
     edge_mm: f64,
     settings: &DrawnSettings,
-) -> Result<SpacedMesh, CrestFault> {
+) -> Result<(SpacedMesh, Flanks), CrestFault> {
     let bases = std::iter::once(settings.base_mm).chain(std::iter::repeat(settings.hole_base_mm));
     let rims: Vec<Rim> =
         region.rings().zip(bases).map(|(ring, base)| rim(ring, base, edge_mm, settings)).collect();
@@ -75,13 +71,16 @@ pub(super) fn fill(
     let creases: HashSet<[u32; 2]> =
         strips.creases.iter().flat_map(|&[a, b]| [[a, b], [b, a]]).collect();
     let faces = paired(&plan, &triangles, &creases);
-    let heights = heights(&plan, &faces, strips, &rims, settings);
+
+    let mut base = vec![settings.base_mm; crest];
+    base.extend(rims.iter().flat_map(|rim| rim.points.iter().map(|_| rim.base_mm)));
+    base.resize(plan.len(), settings.base_mm);
 
     let mut mesh = PolyMesh::new();
     for v in 0..plan.len() {
         let at = match strips.vertices.get(v) {
             Some(p) => p.truncate() / p.w,
-            None => plan[v].extend(heights[v]),
+            None => plan[v].extend(base[v]),
         };
         mesh.add_vertex(at, corner[v]);
     }
@@ -101,7 +100,10 @@ pub(super) fn fill(
     for &([from, to], d) in &strips.beyond {
         out.set_beyond(from, to, d);
     }
-    Ok(out)
+    let mut flanks = Flanks::new(settings.profile, strips.chains.clone(), base);
+    let at = region.bounds().center();
+    flanks.raise(&mut out).map_err(|why| CrestFault::Mesh { at, why })?;
+    Ok((out, flanks))
 }
 
 /// Control points whose cubic B-spline goes through points of a ring, so close that it follows the ring.
@@ -307,70 +309,4 @@ fn paired(plan: &[DVec2], triangles: &[[u32; 3]], creases: &HashSet<[u32; 2]>) -
 fn crooked(p: [DVec2; 4], k: usize) -> f64 {
     let (a, b) = (p[(k + 1) % 4] - p[k], p[(k + 3) % 4] - p[k]);
     (libm::atan2(a.perp_dot(b), a.dot(b)).to_degrees() - 90.0).abs()
-}
-
-/// The height of every vertex that no strip has placed.
-fn heights(
-    plan: &[DVec2],
-    faces: &[Vec<u32>],
-    strips: &Strips,
-    rims: &[Rim],
-    settings: &DrawnSettings,
-) -> Vec<f64> {
-    let n = plan.len();
-    let mut edges: Vec<[u32; 2]> = Vec::new();
-    for face in faces {
-        let next = face.iter().cycle().skip(1);
-        edges.extend(face.iter().zip(next).map(|(&a, &b)| [a.min(b), a.max(b)]));
-    }
-    edges.sort_unstable();
-    edges.dedup();
-    let mut near: Vec<Vec<(u32, f64)>> = vec![Vec::new(); n];
-    for [a, b] in edges {
-        let weight = 1.0 / plan[a as usize].distance(plan[b as usize]).max(f64::MIN_POSITIVE);
-        near[a as usize].push((b, weight));
-        near[b as usize].push((a, weight));
-    }
-    let crest: Vec<f64> = strips.vertices.iter().map(|p| p.z / p.w).collect();
-    let rim: Vec<f64> = rims.iter().flat_map(|r| r.points.iter().map(|_| r.base_mm)).collect();
-    let known = |on_crest: Option<f64>, on_rim: Option<f64>| -> Vec<Option<f64>> {
-        let crests = crest.iter().map(|z| Some(on_crest.unwrap_or(*z)));
-        let crests: Vec<Option<f64>> = crests.collect();
-        let rims: Vec<Option<f64>> = rim.iter().map(|_| on_rim).collect();
-        crests.into_iter().chain(rims).chain(std::iter::repeat(None)).take(n).collect()
-    };
-    let part = relaxed(&near, &known(Some(1.0), Some(0.0)));
-    let top = relaxed(&near, &known(None, None));
-    let mut on_rims = vec![None; crest.len()];
-    on_rims.extend(rim.iter().map(|z| Some(*z)));
-    on_rims.resize(n, None);
-    let base = relaxed(&near, &on_rims);
-    (0..n).map(|v| base[v] + (top[v] - base[v]) * profile_at(settings.profile, part[v])).collect()
-}
-
-/// Weighted means of the neighbours wherever no value is known (successive over-relaxation, in a fixed order).
-fn relaxed(near: &[Vec<(u32, f64)>], known: &[Option<f64>]) -> Vec<f64> {
-    let given = known.iter().flatten();
-    let mean = given.clone().sum::<f64>() / (given.count().max(1)) as f64;
-    let mut z: Vec<f64> = known.iter().map(|k| k.unwrap_or(mean)).collect();
-    for _ in 0..ROUNDS {
-        let mut moved: f64 = 0.0;
-        for v in 0..z.len() {
-            if known[v].is_some() || near[v].is_empty() {
-                continue;
-            }
-            let (mut sum, mut weights) = (0.0, 0.0);
-            for &(w, weight) in &near[v] {
-                sum += z[w as usize] * weight;
-                weights += weight;
-            }
-            let by = STEP * (sum / weights - z[v]);
-            z[v] += by;
-            moved = moved.max(by.abs());
-        }
-        if moved < 1e-9 {
-            break;
-        }
-    }
-    z
 }

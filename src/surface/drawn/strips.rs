@@ -9,6 +9,7 @@
 //! ```
 
 use super::arms::{Arm, End, Joint, Net};
+use super::flanks::Chain;
 use super::line::Line;
 use super::{CrestFault, DrawnSettings};
 use crate::geom::{DVec2, DVec3, DVec4, distance_to_segment, orient};
@@ -23,6 +24,8 @@ const LEAST_CELLS: f64 = 2.0;
 /// Strips take up this part of the way to another crest, or of the radius of a bend.
 const SHARE: f64 = 0.3;
 const BEND_SHARE: f64 = 0.6;
+/// Crests are round over this part of the way to the outline at most.
+const MOST_ROUND: f64 = 0.3;
 
 /// The strips and creases over a region.
 #[derive(Debug, Clone, Default)]
@@ -38,6 +41,8 @@ pub(super) struct Strips {
     pub(super) beyond: Vec<([u32; 2], [f64; 2])>,
     pub(super) creases: Vec<[u32; 2]>,
     pub(super) corners: Vec<u32>,
+    /// The centres of the strips and the creases.
+    pub(super) chains: Vec<Chain>,
 }
 
 impl Strips {
@@ -85,17 +90,26 @@ struct Widths<'a> {
 impl Widths<'_> {
     /// Half the width of the strip of a line at a place.
     fn at(&self, line: usize, p: DVec2) -> f64 {
-        let least = LEAST_CELLS * self.settings.cell_mm;
-        let own = match self.lines[line].half_width_mm {
-            Some(width) => width,
-            None => (WIDTH * self.outline.distance(p)).max(least) * self.part,
-        };
+        let own = self.own(line, self.outline.distance(p));
         let others = self.lines.iter().enumerate().filter(|(k, _)| *k != line);
         let segments = others.flat_map(|(_, line)| line.points.windows(2));
         let near = segments
             .map(|w| distance_to_segment(p, w[0].truncate(), w[1].truncate()))
             .fold(f64::INFINITY, f64::min);
         own.min(SHARE * near)
+    }
+
+    /// The same where no other line is near, that far from the outline.
+    fn own(&self, line: usize, far: f64) -> f64 {
+        let least = LEAST_CELLS * self.settings.cell_mm;
+        let width = self.lines[line].half_width_mm;
+        width.unwrap_or_else(|| (WIDTH * far).max(least) * self.part)
+    }
+
+    /// Half the width over which a line is round at a place, in parts of the way to the outline.
+    fn round(&self, line: usize, p: DVec2) -> f64 {
+        let far = self.outline.distance(p);
+        if self.lines[line].sharp { 0.0 } else { (self.own(line, far) / far).min(MOST_ROUND) }
     }
 }
 
@@ -112,11 +126,17 @@ pub(super) fn strips(
     let rounds: Vec<Round> =
         net.joints.iter().map(|joint| out.round(joint, lines, &widths)).collect();
     for arm in &net.arms {
-        if lines[arm.line].sharp {
-            out.crease(arm, &lines[arm.line], &rounds)?;
+        let mut vertices = if lines[arm.line].sharp {
+            out.crease(arm, &lines[arm.line], &rounds)?
         } else {
-            out.strip(arm, lines, &rounds, &widths)?;
+            out.strip(arm, lines, &rounds, &widths)?
+        };
+        if arm.spline.closed {
+            vertices.push(vertices[0]);
         }
+        let round = vertices.iter().map(|&v| widths.round(arm.line, out.plan(v))).collect();
+        let beyond = arm.ends.map(|end| end == End::Free && !arm.spline.closed);
+        out.chains.push(Chain { vertices, beyond, sharp: lines[arm.line].sharp, round });
     }
     out.check_upright()?;
     Ok(out)
@@ -191,7 +211,8 @@ impl Strips {
         Ok((points, d, on))
     }
 
-    fn crease(&mut self, arm: &Arm, line: &Line, rounds: &[Round]) -> Result<(), CrestFault> {
+    /// Lays a crease and gives its vertices.
+    fn crease(&mut self, arm: &Arm, line: &Line, rounds: &[Round]) -> Result<Vec<u32>, CrestFault> {
         let (points, d, on) = Self::extended(arm, &line.name)?;
         let n = points.len();
         let joint = |end: End| match end {
@@ -222,16 +243,17 @@ impl Strips {
             let ends = [(0, vertices[0]), (1, vertices[n - 1])];
             self.corners.extend(ends.iter().filter(|e| arm.ends[e.0] == End::Clamped).map(|e| e.1));
         }
-        Ok(())
+        Ok(vertices)
     }
 
+    /// Lays a strip and gives the vertices along its centre.
     fn strip(
         &mut self,
         arm: &Arm,
         lines: &[Line],
         rounds: &[Round],
         widths: &Widths<'_>,
-    ) -> Result<(), CrestFault> {
+    ) -> Result<Vec<u32>, CrestFault> {
         let name = &lines[arm.line].name;
         let (points, d, mut on) = Self::extended(arm, name)?;
         let (n, closed) = (points.len(), arm.spline.closed);
@@ -275,7 +297,12 @@ impl Strips {
             columns.push([round.corners[slot], round.arms[slot], round.corners[(slot + 3) % 4]]);
         }
         self.lay(&columns, &spacings, closed, on);
-        Ok(())
+        let centre = |end: End| match end {
+            End::Joint { joint, .. } => Some(rounds[joint].centre),
+            End::Free | End::Clamped => None,
+        };
+        let inner = columns.iter().map(|column| column[1]);
+        Ok(centre(arm.ends[0]).into_iter().chain(inner).chain(centre(arm.ends[1])).collect())
     }
 
     /// Quadrilaterals, spacings and the table of a strip's columns; `on` are the spacings before and after its rows.

@@ -85,6 +85,14 @@ impl SpacedMesh {
         }
     }
 
+    /// Moves a vertex up or down to a height, mm.
+    pub fn set_height(&mut self, vertex: u32, height_mm: f64) {
+        let v = vertex as usize;
+        if let (Some(weight), Some(at)) = (self.weight.get(v), self.mesh.vertices.get_mut(v)) {
+            at.z = height_mm * weight;
+        }
+    }
+
     /// Says what lies beyond vertex `from`, seen along the edge from `to`: the spacings found by turning that edge about
     /// `from` twice, counter-clockwise and clockwise. The first step uses them and drops them: later ones find half the
     /// edge itself there.
