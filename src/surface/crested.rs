@@ -9,7 +9,7 @@ use super::calm::{Ripples, calmer, ripples};
 use super::profile::{self, Flank, lean, own_wall};
 use super::ridge::{Heights, Ridge};
 use super::rungs::{Rungs, rungs};
-use super::subdivide::{CoonsRules, PolyMesh, adaptive, coons, limit, subdivide};
+use super::subdivide::{CoonsRules, PolyMesh, adaptive, limit, subdivide};
 use super::{
     FINE, Mesh, Over, Patch, Remark, Rim, RuledFault, Segments, Surface, Way, Window, control,
     inscribed_radius, literal, ratio, rim, ruled,
@@ -314,13 +314,14 @@ impl Skeleton {
         let fine = match spec.adaptive_mm {
             Some(tolerance_mm) => adaptive(&control, tolerance_mm, levels),
             None if spec.scheme == Scheme::Coons => {
-                coons(&control, CoonsRules { draft_rad, ..CoonsRules::default() }, levels)
+                let rules = CoonsRules { draft_rad, ..CoonsRules::default() };
+                rim::coons_on(&control, rules, levels, &self.sampled)
             }
             None => subdivide(&control, spec.scheme, levels),
         };
         let settled = fine.and_then(|fine| limit(&fine, spec.scheme));
         let mut mesh = settled.map_err(RuledFault::Subdivision)?.to_triangles();
-        if spec.scheme.interpolates() {
+        if spec.scheme.interpolates() && spec.scheme != Scheme::Coons {
             rim::follow(&mut mesh, &control, &self.sampled);
         }
         // Folds that are left are found by the check.

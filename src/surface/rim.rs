@@ -5,7 +5,7 @@
 //! so the vertices between are put onto the outline itself, as far along as they are along the curve. Layers that
 //! share a border then leave no groove between them.
 
-use super::{Mesh, PolyMesh};
+use super::{CoonsMesh, CoonsRules, Mesh, PolyMesh, SubdivideError};
 use crate::geom::{DVec2, DVec3};
 use crate::skeleton::Sampled;
 use std::collections::HashMap;
@@ -58,6 +58,43 @@ pub(super) fn follow(mesh: &mut Mesh, control: &PolyMesh, sampled: &Sampled) {
             *vertex = at.extend(vertex.z);
         }
     }
+}
+
+/// A Coons surface whose rim lies on the outline at every level: so its slope there is that of its rules. Edges of the rim
+/// whose ends do not follow each other on one ring stay as they come.
+///
+/// # Errors
+/// [`SubdivideError`]: the mesh is no manifold, or gets too large.
+pub(super) fn coons_on(
+    control: &PolyMesh,
+    rules: CoonsRules,
+    levels: u32,
+    sampled: &Sampled,
+) -> Result<PolyMesh, SubdivideError> {
+    let mut coons = CoonsMesh::new(control.clone(), rules)?;
+    // Only ever asked for a key.
+    let mut places: HashMap<u32, (usize, f64)> = (coons.rim())
+        .map(|[from, ..]| (from, place_of(control.vertices[from as usize].truncate(), sampled)))
+        .collect();
+    for _ in 0..levels {
+        let mut fine = coons.refined()?;
+        for [from, to, between] in coons.rim() {
+            let (Some(&(ring, start)), Some(&(other, end))) = (places.get(&from), places.get(&to))
+            else {
+                continue;
+            };
+            let curve = &sampled.curves[ring];
+            let span = curve.wrapped(end - start);
+            if ring == other && span <= 0.5 * curve.length() {
+                let place = start + 0.5 * span;
+                let z = fine.mesh().vertices[between as usize].z;
+                fine.put(between, curve.at(place).extend(z));
+                places.insert(between, (ring, place));
+            }
+        }
+        coons = fine;
+    }
+    Ok(coons.into_mesh())
 }
 
 /// The ring that a point lies on and its place there.

@@ -97,6 +97,20 @@ impl CoonsMesh {
         self.mesh
     }
 
+    /// Puts a vertex elsewhere; tangents stay.
+    pub fn put(&mut self, vertex: u32, at: DVec3) {
+        self.mesh.vertices[vertex as usize] = at;
+    }
+
+    /// The edges on the boundary: from, to, and which vertex of [`Self::refined`] lies between.
+    pub fn rim(&self) -> impl Iterator<Item = [u32; 3]> {
+        let old = self.mesh.vertices.len() as u32;
+        let halves = self.topology.halves().iter().filter(|&&h| self.topology.twin(h).is_none());
+        halves.map(move |&h| {
+            [self.topology.from(h), self.topology.to(h), old + self.topology.edge(h)]
+        })
+    }
+
     /// The unit tangent at vertex `from` along the edge to vertex `to`, if there is one.
     pub fn tangent(&self, from: u32, to: u32) -> Option<DVec3> {
         self.end(from, to).map(|end| self.at_end(end))
