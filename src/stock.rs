@@ -5,14 +5,16 @@
 //! other move, so that one that runs into wood shows.
 
 mod drawn;
+mod lattice;
 mod sweep;
 
 use crate::cutter::{Profile, Turned};
 use crate::geom::{DVec2, DVec3, Grid, Heightfield, Move};
 use crate::job::Stock;
-use drawn::Drawn;
+use drawn::{Drawn, Reach};
+use lattice::{Batch, Lattice, for_nodes};
 use rayon::prelude::*;
-use sweep::{Joint, Left, SPAN_SLACK_MM, Span, Sweep, Tip};
+use sweep::{Joint, Sweep, Tip, high};
 
 /// What a move met.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -61,6 +63,9 @@ const BAND_ROWS: usize = 64;
 
 /// Widest wedge at a joint that counts as thin, nodes.
 const THIN_NODES: f64 = 2.0;
+
+/// From so many moves on the table of a convex end's reach ([`Reach`]) takes less time than it saves.
+const REACH_PAYS_FROM_MOVES: usize = 8;
 
 /// Rapids carve with a cutter this much slimmer, mm: a retract from the end of a cut grazes nodes that lie just on
 /// the rim of the cut, and whether round-off puts them in or out must not look like a rapid through wood.
@@ -156,8 +161,8 @@ impl Block {
         })
     }
 
-    /// [`Block::cut_alone`] for any convex end. In a chain a move leaves to the one before it what that one cuts no
-    /// higher: the nodes over which the tip would be lowest before the move begins.
+    /// [`Block::cut_alone`] for any convex end. As there, a move serves the nodes over which the tip is lowest during it,
+    /// and at a joint those where it is lowest there.
     fn cut_turned(
         &mut self,
         form: &Turned,
@@ -168,15 +173,21 @@ impl Block {
         let Profile::Turned(slim) = profile.slimmed(RAPID_SLIM_MM) else {
             unreachable!("a slimmer form is of the same kind");
         };
+        let reach = (moves.len() >= REACH_PAYS_FROM_MOVES).then(|| Reach::of(form));
         let goes_on = |k: usize| {
             let (a, b) = (&moves[k - 1], &moves[k]);
             a.to == b.from && a.is_rapid() == b.is_rapid() && !alone(k - 1) && !alone(k)
         };
         self.carve(form.radius_mm(), moves, |band, k, contact| {
             let m = &moves[k];
-            let form = if m.is_rapid() { &*slim } else { form };
             let follows = k > 0 && goes_on(k);
-            band.carve(&Sweep::Turned(Drawn::of(m, form, follows)), contact);
+            let next = moves.get(k + 1).filter(|_| goes_on(k + 1));
+            let drawn = if m.is_rapid() {
+                Drawn::of(m, &slim, None, follows, next)
+            } else {
+                Drawn::of(m, form, reach.as_ref(), follows, next)
+            };
+            band.carve(&Sweep::Turned(drawn), contact);
         })
     }
 
@@ -197,7 +208,8 @@ impl Block {
             .zip(bins)
             .enumerate()
             .map(|(b, (z, bin))| {
-                let mut band = Band { lattice, row0: b * BAND_ROWS, z };
+                let batch = &mut Batch::new();
+                let mut band = Band { lattice, row0: b * BAND_ROWS, z, batch };
                 let mut met = Vec::new();
                 for k in bin {
                     let mut contact = Contact::default();
@@ -273,15 +285,12 @@ impl Block {
         let (lo, hi) = sweep.y_range();
         let (j0, j1) = lattice.rows(lo, hi, 0, lattice.grid.ny)?;
         let mut worst: Option<Touch> = None;
-        for j in j0..=j1 {
-            let row = self.field.row(j);
-            for_nodes(&lattice, &sweep, j, |i, left| {
-                let depth_mm = f64::from(row[i]) - (left.z + above_tip_mm);
-                if depth_mm > worst.map_or(0.0, |w| w.depth_mm) {
-                    worst = Some(Touch { at: lattice.grid.node(i, j), depth_mm });
-                }
-            });
-        }
+        for_nodes(&lattice, &mut Batch::new(), &sweep, [j0, j1], |i, j, left| {
+            let depth_mm = f64::from(self.field.at(i, j)) - (left.z + above_tip_mm);
+            if depth_mm > worst.map_or(0.0, |w| w.depth_mm) {
+                worst = Some(Touch { at: lattice.grid.node(i, j), depth_mm });
+            }
+        });
         worst
     }
 }
@@ -315,6 +324,7 @@ struct Band<'a> {
     lattice: Lattice,
     row0: usize,
     z: &'a mut [f32],
+    batch: &'a mut Batch,
 }
 
 impl Band<'_> {
@@ -325,105 +335,25 @@ impl Band<'_> {
         let Some((j0, j1)) = self.lattice.rows(lo, hi, self.row0, self.row0 + rows_here) else {
             return;
         };
-        for j in j0..=j1 {
-            let row = &mut self.z[(j - self.row0) * nx..][..nx];
-            for_nodes(&self.lattice, sweep, j, |i, left| {
-                let old = row[i];
-                let new = left.z as f32;
-                if new < old {
-                    row[i] = new;
-                    contact.deepest_mm = contact.deepest_mm.max(old - new);
-                    let removed_mm = f64::from(old) - left.z;
-                    if removed_mm > ENGAGED_FROM_MM {
-                        let engaged = (f64::from(old) - left.tip) as f32;
-                        contact.engaged_mm = contact.engaged_mm.max(engaged);
-                    }
-                    if removed_mm > CHIP_FROM_MM {
-                        let chip = sweep.chip(f64::from(old) - left.tip, left.beside) as f32;
-                        contact.chip = contact.chip.max(chip);
-                    }
-                }
-            });
-        }
-    }
-}
-
-/// Calls `f` with the column of every node of row `j` that a sweep comes to, and what it leaves there.
-#[inline]
-fn for_nodes(lattice: &Lattice, sweep: &Sweep, j: usize, f: impl FnMut(usize, Left)) {
-    match sweep {
-        Sweep::Stamp(s) => lattice.visit(j, s.anchor(), |dy| s.spans(dy), |d| s.left(d), f),
-        Sweep::Along(a) => lattice.visit(j, a.anchor(), |dy| a.spans(dy), |d| a.left(d), f),
-        Sweep::Turned(t) => lattice.visit(j, t.anchor(), |dy| t.spans(dy), |d| t.left(d), f),
-    }
-}
-
-/// A grid made ready for finding nodes.
-#[derive(Debug, Clone, Copy)]
-struct Lattice {
-    grid: Grid,
-    per_mm: f64,
-}
-
-impl Lattice {
-    fn new(grid: Grid) -> Self {
-        Self { grid, per_mm: 1.0 / grid.pitch_mm }
-    }
-
-    /// First and last row in `from..to` with y in `lo..=hi`.
-    fn rows(&self, lo: f64, hi: f64, from: usize, to: usize) -> Option<(usize, usize)> {
-        let y0 = self.grid.origin.y;
-        index_range((lo - y0) * self.per_mm, (hi - y0) * self.per_mm, from, to)
-    }
-
-    /// First and last column with x in `lo..=hi`.
-    #[inline]
-    fn columns(&self, lo: f64, hi: f64) -> Option<(usize, usize)> {
-        let x0 = self.grid.origin.x;
-        index_range((lo - x0) * self.per_mm, (hi - x0) * self.per_mm, 0, self.grid.nx)
-    }
-
-    /// Calls `f` with the column of every node of row `j` in `spans` (by the row's height above the anchor), and what is
-    /// left there (by the offset from the anchor).
-    #[inline]
-    fn visit<const N: usize>(
-        &self,
-        j: usize,
-        anchor: DVec3,
-        spans: impl Fn(f64) -> [Span; N],
-        left: impl Fn(DVec2) -> Option<Left>,
-        mut f: impl FnMut(usize, Left),
-    ) {
-        let (origin, pitch) = (self.grid.origin, self.grid.pitch_mm);
-        let dy = origin.y + j as f64 * pitch - anchor.y;
-        let x0 = origin.x - anchor.x;
-        for span in spans(dy) {
-            let lo = anchor.x + span.lo - SPAN_SLACK_MM;
-            let hi = anchor.x + span.hi + SPAN_SLACK_MM;
-            if hi < lo {
-                continue;
-            }
-            let Some((i0, i1)) = self.columns(lo, hi) else { continue };
-            for i in i0..=i1 {
-                if let Some(left) = left(DVec2::new(x0 + i as f64 * pitch, dy)) {
-                    f(i, left);
+        let (mut deepest, mut engaged, mut ahead) = (0.0_f32, 0.0_f64, f64::NEG_INFINITY);
+        for_nodes(&self.lattice, self.batch, sweep, [j0, j1], |i, j, left| {
+            let node = &mut self.z[(j - self.row0) * nx + i];
+            let (old, new) = (*node, left.z as f32);
+            if new < old {
+                *node = new;
+                deepest = if old - new > deepest { old - new } else { deepest };
+                let wood = f64::from(old);
+                let (removed_mm, high_mm) = (wood - left.z, wood - left.tip);
+                let here = if removed_mm > ENGAGED_FROM_MM { high_mm } else { 0.0 };
+                engaged = high(engaged, here);
+                if removed_mm > CHIP_FROM_MM {
+                    ahead = high(ahead, sweep.ahead(high_mm, left.beside));
                 }
             }
-        }
+        });
+        let chip = if ahead > 0.0 { sweep.chip(ahead) as f32 } else { 0.0 };
+        *contact = contact.worst(Contact { deepest_mm: deepest, engaged_mm: engaged as f32, chip });
     }
-}
-
-/// The whole numbers in `lo..=hi` that are in `from..to`, as first and last.
-#[inline]
-fn index_range(lo: f64, hi: f64, from: usize, to: usize) -> Option<(usize, usize)> {
-    // Casts saturate and drop the fraction: a grid has far fewer than 2^31 rows and columns. Rounding up by
-    // hand, for ceil() is a call on plain x86-64.
-    let below = lo.max(from as f64) as i32;
-    let first = below as usize + usize::from(f64::from(below) < lo);
-    if hi < first as f64 || first >= to {
-        return None;
-    }
-    Some((first, (hi as i32 as usize).min(to - 1)))
 }
 
 #[cfg(test)]

@@ -317,12 +317,19 @@ impl Turned {
 
     /// Radius at which the end has this height above the tip, mm; the rim where it is never so high.
     pub fn radius_at(&self, height_mm: f64) -> f64 {
-        let (mut lo, mut hi) = (0.0, self.radius_mm);
-        for _ in 0..MOST_STEPS {
-            let middle = 0.5 * (lo + hi);
-            if self.height(middle) <= height_mm { lo = middle } else { hi = middle }
+        for piece in &self.pieces {
+            if piece.height(piece.to) <= height_mm {
+                continue;
+            }
+            let at = match piece.form {
+                Form::Line { r, h, slope } => r + (height_mm - h) / slope,
+                Form::Arc { r, h, radius } => {
+                    r + (radius * radius - (h - height_mm).powi(2)).max(0.0).sqrt()
+                }
+            };
+            return at.clamp(piece.from, piece.to);
         }
-        lo
+        self.radius_mm
     }
 
     /// A form inside this one whose rim is `by_mm` further in; where the ball is larger than that, the whole side is.

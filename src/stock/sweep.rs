@@ -33,32 +33,52 @@ impl Span {
     pub(super) const EMPTY: Self = Self { lo: f64::INFINITY, hi: f64::NEG_INFINITY };
     const ALL: Self = Self { lo: f64::NEG_INFINITY, hi: f64::INFINITY };
 
+    #[inline(always)]
     pub(super) fn new(lo: f64, hi: f64) -> Self {
         Self { lo, hi }
     }
 
+    #[inline(always)]
+    fn only_if(self, there: bool) -> Self {
+        let Self { lo, hi } = Self::EMPTY;
+        Self { lo: if there { self.lo } else { lo }, hi: if there { self.hi } else { hi } }
+    }
+
+    #[inline(always)]
     pub(super) fn meet(self, o: Self) -> Self {
-        Self { lo: self.lo.max(o.lo), hi: self.hi.min(o.hi) }
+        Self { lo: high(self.lo, o.lo), hi: low(self.hi, o.hi) }
     }
 
     /// The smallest interval that holds both.
+    #[inline(always)]
     pub(super) fn hull(self, o: Self) -> Self {
-        if self.lo > self.hi {
-            o
-        } else if o.lo > o.hi {
-            self
-        } else {
-            Self { lo: self.lo.min(o.lo), hi: self.hi.max(o.hi) }
-        }
+        let (a, b) = (self.only_if(self.lo <= self.hi), o.only_if(o.lo <= o.hi));
+        Self { lo: low(a.lo, b.lo), hi: high(a.hi, b.hi) }
     }
 
     /// What of it lies outside the open interval `o`: a part on the left and one on the right.
+    #[inline(always)]
     fn without(self, o: Self) -> [Self; 2] {
-        if o.lo > o.hi {
-            return [self, Self::EMPTY];
-        }
-        [Self::new(self.lo, self.hi.min(o.lo)), Self::new(self.lo.max(o.hi), self.hi)]
+        // An empty one takes away nothing: then the left part is the whole.
+        let there = o.lo <= o.hi;
+        let cut = if there { o.lo } else { f64::INFINITY };
+        [
+            Self::new(self.lo, low(self.hi, cut)),
+            Self::new(high(self.lo, o.hi), self.hi).only_if(there),
+        ]
     }
+}
+
+/// The lower of two; the second where one is not a number. Unlike `f64::min` one instruction.
+#[inline(always)]
+pub(super) fn low(a: f64, b: f64) -> f64 {
+    if a < b { a } else { b }
+}
+
+/// The higher of two; the second where one is not a number.
+#[inline(always)]
+pub(super) fn high(a: f64, b: f64) -> f64 {
+    if a > b { a } else { b }
 }
 
 /// Round-off allowance at the ends of spans, mm: they keep nodes this far outside.
@@ -103,66 +123,69 @@ impl Behind {
     }
 
     /// Its part of the row `dy` above the point where s = q = 0.
-    #[inline]
+    #[inline(always)]
     fn row(&self, c: f64, dy: f64) -> Span {
+        if self.is_level() { self.level_row(c, dy) } else { self.tilted_row(c, dy) }
+    }
+
+    fn is_level(&self) -> bool {
+        self.u.y.abs() < PARALLEL
+    }
+
+    /// [`Behind::row`] along X. Like the other, without branches that differ between rows, so that many are solved at once.
+    #[inline(always)]
+    fn level_row(&self, c: f64, dy: f64) -> Span {
+        let across = self.u.x * dy;
+        let w2 = self.r * self.r - across * across;
+        let end = c + self.mp * high(w2, 0.0).sqrt();
+        let forward = self.u.x > 0.0;
+        let lo = if forward { f64::NEG_INFINITY } else { -end };
+        Span::new(lo, if forward { end } else { f64::INFINITY }).only_if(w2 >= 0.0)
+    }
+
+    /// [`Behind::row`] in any other direction.
+    #[inline(always)]
+    fn tilted_row(&self, c: f64, dy: f64) -> Span {
         let Self { u, mp, r, .. } = *self;
         let across = u.x * dy;
-        if u.y.abs() < PARALLEL {
-            let w2 = r * r - across * across;
-            if w2 < 0.0 {
-                return Span::EMPTY;
-            }
-            let end = c + mp * w2.sqrt();
-            return if u.x > 0.0 {
-                Span::new(f64::NEG_INFINITY, end)
-            } else {
-                Span::new(-end, f64::INFINITY)
-            };
-        }
         let e = u.y * dy - c;
-        let straight = self.strip_row(across).meet(if u.x > PARALLEL {
-            Span::new(f64::NEG_INFINITY, -e * self.inv_u.x)
+        let strip = self.strip_row(across);
+        let end = -e * self.inv_u.x;
+        let straight = if u.x > PARALLEL {
+            Span::new(strip.lo, low(strip.hi, end))
         } else if u.x < -PARALLEL {
-            Span::new(-e * self.inv_u.x, f64::INFINITY)
-        } else if e <= 0.0 {
-            Span::ALL
+            Span::new(high(strip.lo, end), strip.hi)
         } else {
-            Span::EMPTY
-        });
-        if mp < 1e-9 {
-            return straight;
-        }
+            strip.only_if(e <= 0.0)
+        };
         let mp2 = mp * mp;
         let b = u.x * (e - mp2 * u.y * dy);
         let d = b * b - self.a * (e * e + mp2 * (across * across - r * r));
-        if d < 0.0 {
-            return straight;
-        }
-        let d = d.sqrt();
-        straight.hull(Span::new((-b - d) * self.inv_a, (d - b) * self.inv_a))
+        let root = high(d, 0.0).sqrt();
+        let round = Span::new((-b - root) * self.inv_a, (root - b) * self.inv_a);
+        straight.hull(round.only_if((d >= 0.0) & (mp >= 1e-9)))
     }
 
     /// The part of the strip `|q| <= R` on a row, by `u.x` times its height. The strip is not level.
+    #[inline(always)]
     fn strip_row(&self, across: f64) -> Span {
         let (a, b) = ((across - self.r) * self.inv_u.y, (across + self.r) * self.inv_u.y);
-        Span::new(a.min(b), a.max(b))
+        Span::new(low(a, b), high(a, b))
     }
 }
 
 /// The part of the disc of radius `r` on the row `dy` above its centre.
-fn disc_row(r: f64, dy: f64) -> Span {
+#[inline(always)]
+pub(super) fn disc_row(r: f64, dy: f64) -> Span {
     let w2 = r * r - dy * dy;
-    if w2 < 0.0 {
-        return Span::EMPTY;
-    }
-    let w = w2.sqrt();
-    Span::new(-w, w)
+    let w = high(w2, 0.0).sqrt();
+    Span::new(-w, w).only_if(w2 >= 0.0)
 }
 
 /// What a move leaves at a node.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Left {
-    /// Height of the cut surface, mm.
+    /// Height of the cut surface, mm; infinite where the move does not come.
     pub(super) z: f64,
     /// Height of the tip when it cuts the node, mm.
     pub(super) tip: f64,
@@ -195,11 +218,29 @@ pub(super) struct Along {
     dir: Behind,
     len: f64,
     m: f64,
-    root: f64,
     tip: Tip,
-    /// For the lower and the upper end: how far beyond it (in s - m'w) the move still has to look, because another
-    /// one serves what lies farther; `None` where there is no other.
-    look: [Option<f64>; 2],
+    /// For the lower and the upper end: beyond which curve another move serves the nodes; `None` where there is no
+    /// other.
+    ends: [Option<Bound>; 2],
+}
+
+/// The curve `s = c + m'w(q)` at an end of a move.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Bound {
+    behind: Behind,
+    c: f64,
+}
+
+impl Bound {
+    /// The spans between two of them on the row `dy` above the anchor, for a direction along X or any other.
+    #[inline(always)]
+    pub(super) fn between<const LEVEL: bool>([lo, hi]: &[Self; 2], dy: f64) -> [Span; 2] {
+        if LEVEL {
+            hi.behind.level_row(hi.c, dy).without(lo.behind.level_row(lo.c, dy))
+        } else {
+            hi.behind.tilted_row(hi.c, dy).without(lo.behind.tilted_row(lo.c, dy))
+        }
+    }
 }
 
 /// Direction in plan, length in plan and slope of a move; `None` for plunges and retracts.
@@ -241,37 +282,36 @@ impl Course {
 pub(super) enum Joint {
     /// No chain: both moves have a free end here.
     None,
-    /// A chain whose wedge is so thin that both moves together serve it by looking this far beyond the joint, mm.
-    Thin(f64),
+    /// A chain whose wedge the move that ends there serves with its strip: that reaches up to the curve of the joint's
+    /// slope m' (along the way, the greater of both moves') and `look_mm` beyond.
+    Shared { mp: f64, look_mm: f64 },
     /// A chain with a wedge that the cutter, standing on the joint, serves.
     Wedge,
 }
 
 impl Joint {
-    /// The joint of two consecutive moves; a wedge up to `thin_mm` wide is thin.
+    /// The joint of two consecutive moves; the strip may look up to `thin_mm` beyond its curve.
     pub(super) fn of(a: &Move, b: &Move, tip: Tip, thin_mm: f64) -> Self {
         if a.to != b.from || a.is_rapid() != b.is_rapid() {
             return Self::None;
         }
         let (Some(ca), Some(cb)) = (Course::of(a), Course::of(b)) else { return Self::None };
+        let (ma, mb) = (ca.mp(tip), cb.mp(tip));
         if tip.flat {
             // A flat cutter's joint only matters where it goes down and then does not.
-            return if ca.m < 0.0 && cb.m >= 0.0 { Self::Wedge } else { Self::Thin(0.0) };
+            let valley = ma < 0.0 && mb >= 0.0;
+            return if valley { Self::Wedge } else { Self::Shared { mp: ma, look_mm: 0.0 } };
         }
-        let (ma, mb) = (ca.mp(tip), cb.mp(tip));
         let turn = ca.u.distance(cb.u);
-        // The wedge is s_a - ma w_a >= 0 >= s_b - mb w_b; s changes by at most R turn, w by R sqrt(2 turn).
-        let width = (mb - ma).max(0.0) + turn + mb.abs() * (2.0 * turn).sqrt();
-        let width_mm = tip.radius * width;
-        if width_mm <= thin_mm { Self::Thin(width_mm) } else { Self::Wedge }
-    }
-
-    fn look(self) -> Option<f64> {
-        match self {
-            Self::None => None,
-            Self::Thin(mm) => Some(mm),
-            Self::Wedge => Some(0.0),
+        // The wedge is s_a - ma w_a >= 0 >= s_b - mb w_b; s changes by at most R turn, w by R sqrt(2 turn). In a valley
+        // the curve of the rising move is not one that a falling move knows.
+        let rise = if ma < 0.0 { mb.max(0.0) } else { 0.0 };
+        let look_mm = tip.radius * (rise + turn + mb.abs() * (2.0 * turn).sqrt());
+        if look_mm > thin_mm {
+            return Self::Wedge;
         }
+        let mp = ma.max(mb);
+        Self::Shared { mp: if ma < 0.0 { mp.min(0.0) } else { mp }, look_mm }
     }
 }
 
@@ -283,18 +323,23 @@ impl Sweep<'_> {
             return Self::Stamp(Stamp { at, tip, wedge: None });
         };
         let (dir, turned) = course.behind(tip);
-        // What a thin wedge asks for is served by the move that ends there.
-        let start = joints[0].look().map(|_| 0.0);
-        let (from, to) = (start, joints[1].look());
-        let m = course.m.abs();
+        let bound = |c: f64, mp: f64| Some(Bound { behind: Behind::new(dir.u, mp, dir.r), c });
+        // What a joint asks for is served by the move that ends there; the one that begins there keeps to its own curve.
+        let (start, end) = if turned { (course.len, 0.0) } else { (0.0, course.len) };
+        let first = if joints[0] == Joint::None { None } else { bound(start, dir.mp) };
+        let last = match joints[1] {
+            Joint::None => None,
+            Joint::Wedge => bound(end, dir.mp),
+            Joint::Shared { mp, look_mm } if turned => bound(end - look_mm, -mp),
+            Joint::Shared { mp, look_mm } => bound(end + look_mm, mp),
+        };
         Self::Along(Along {
             low: if turned { mv.to } else { mv.from },
             dir,
             len: course.len,
-            m,
-            root: (1.0 + m * m).sqrt(),
+            m: course.m.abs(),
             tip,
-            look: if turned { [to, from] } else { [from, to] },
+            ends: if turned { [last, first] } else { [first, last] },
         })
     }
 
@@ -309,18 +354,28 @@ impl Sweep<'_> {
         Some(Self::Stamp(Stamp { at: a.to, tip, wedge }))
     }
 
-    /// The forward part of the normal of the cutter's surface at `height_mm` above the tip, `beside_mm` off its way; 0 where
-    /// the cutter stands (its neighbours in a chain tell).
-    pub(super) fn chip(&self, height_mm: f64, beside_mm: f64) -> f64 {
-        let ahead = |reach_mm: f64| (reach_mm * reach_mm - beside_mm * beside_mm).max(0.0).sqrt();
+    /// A measure that grows with the chip of a node where wood stands `height_mm` above the tip, `beside_mm` off its way: of
+    /// the largest one [`Sweep::chip`] is taken. None where the cutter stands (its neighbours in a chain tell).
+    #[inline(always)]
+    pub(super) fn ahead(&self, height_mm: f64, beside_mm: f64) -> f64 {
         match self {
             Self::Stamp(_) => 0.0,
-            Self::Along(a) if a.tip.flat => ahead(a.tip.radius) / a.tip.radius,
             Self::Along(a) => {
-                let h = height_mm.clamp(0.0, a.tip.radius);
-                ahead((h * (2.0 * a.tip.radius - h)).sqrt()) / a.tip.radius
+                let r = a.tip.radius;
+                let h = low(high(height_mm, 0.0), r);
+                let reach2 = if a.tip.flat { r * r } else { h * (2.0 * r - h) };
+                reach2 - beside_mm * beside_mm
             }
             Self::Turned(t) => t.chip(height_mm, beside_mm),
+        }
+    }
+
+    /// The forward part of the normal of the cutter's surface for the largest of [`Sweep::ahead`].
+    pub(super) fn chip(&self, ahead: f64) -> f64 {
+        match self {
+            Self::Stamp(_) => 0.0,
+            Self::Along(a) => ahead.max(0.0).sqrt() / a.tip.radius,
+            Self::Turned(_) => ahead,
         }
     }
 
@@ -332,8 +387,8 @@ impl Sweep<'_> {
             Self::Along(a) => {
                 let (u, r) = (a.dir.u, a.tip.radius);
                 // The strip lies in a rectangle in s and q; free ends add their discs.
-                let (lo, hi, across) = match a.look {
-                    [Some(lo), Some(hi)] => (-lo, a.len + hi + a.dir.mp * r, r * u.x.abs()),
+                let (lo, hi, across) = match a.ends {
+                    [Some(lo), Some(hi)] => (lo.c, hi.c + hi.behind.mp * r, r * u.x.abs()),
                     _ => (0.0, a.len, r),
                 };
                 let (p, q) = (lo * u.y, hi * u.y);
@@ -351,7 +406,7 @@ impl Stamp {
     }
 
     /// The spans of x to look at on the row `dy` above the anchor.
-    #[inline]
+    #[inline(always)]
     pub(super) fn spans(&self, dy: f64) -> [Span; 4] {
         let mut out = [disc_row(self.tip.radius, dy), Span::EMPTY, Span::EMPTY, Span::EMPTY];
         for (behind, inside) in self.wedge.iter().flatten() {
@@ -367,15 +422,13 @@ impl Stamp {
         out
     }
 
-    /// What it leaves at the node `d` from the anchor; `None` where it does not come.
-    #[inline]
-    pub(super) fn left(&self, d: DVec2) -> Option<Left> {
+    /// What it leaves at the node `d` from the anchor.
+    #[inline(always)]
+    pub(super) fn left(&self, d: DVec2) -> Left {
         let h2 = self.tip.radius * self.tip.radius - d.length_squared();
-        if h2 < 0.0 {
-            return None;
-        }
-        let up = if self.tip.flat { 0.0 } else { self.tip.radius - h2.sqrt() };
-        Some(Left { z: self.at.z + up, tip: self.at.z, beside: 0.0 })
+        let up = if self.tip.flat { 0.0 } else { self.tip.radius - high(h2, 0.0).sqrt() };
+        let z = if h2 >= 0.0 { self.at.z + up } else { f64::INFINITY };
+        Left { z, tip: self.at.z, beside: 0.0 }
     }
 }
 
@@ -386,18 +439,22 @@ impl Along {
     }
 
     /// The spans of x to look at on the row `dy` above the anchor.
-    #[inline]
+    #[inline(always)]
     pub(super) fn spans(&self, dy: f64) -> [Span; 2] {
-        let base = match self.look {
-            [Some(_), Some(hi)] => self.dir.row(self.len + hi, dy),
-            [None, Some(hi)] => self.stadium_row(dy).meet(self.dir.row(self.len + hi, dy)),
-            [_, None] => self.stadium_row(dy),
-        };
-        let Some(lo) = self.look[0] else { return [base, Span::EMPTY] };
-        base.without(self.dir.row(-lo, dy))
+        let stadium = self.stadium_row(dy);
+        let [lo, hi] = self.ends;
+        let base = hi.map_or(stadium, |hi| stadium.meet(hi.behind.row(hi.c, dy)));
+        lo.map_or([base, Span::EMPTY], |lo| base.without(lo.behind.row(lo.c, dy)))
+    }
+
+    /// Its two curves where it is the inner part of a chain, and whether it runs along X.
+    pub(super) fn inner(&self) -> Option<([Bound; 2], bool)> {
+        let [Some(lo), Some(hi)] = self.ends else { return None };
+        Some(([lo, hi], self.dir.is_level()))
     }
 
     /// The part of the stadium (all that the cutter passes over) on the row `dy` above the lower end.
+    #[inline(always)]
     fn stadium_row(&self, dy: f64) -> Span {
         let (u, r) = (self.dir.u, self.tip.radius);
         let end = u * self.len;
@@ -422,34 +479,21 @@ impl Along {
         discs.hull(strip.meet(along))
     }
 
-    /// What it leaves at the node `d` from the anchor; `None` where it does not come.
-    #[inline]
-    pub(super) fn left(&self, d: DVec2) -> Option<Left> {
+    /// What it leaves at the node `d` from the anchor.
+    #[inline(always)]
+    pub(super) fn left(&self, d: DVec2) -> Left {
         let u = self.dir.u;
         let r = self.tip.radius;
         let s = u.x * d.x + u.y * d.y;
         let q = u.x * d.y - u.y * d.x;
         let w2 = r * r - q * q;
-        if w2 < 0.0 {
-            return None;
-        }
-        let w = w2.sqrt();
-        let best = s - self.dir.mp * w;
-        let at = if best < 0.0 {
-            0.0
-        } else if best > self.len {
-            self.len
-        } else {
-            let tip = self.low.z + self.m * best;
-            let z = if self.tip.flat { tip } else { self.low.z + self.m * s + r - w * self.root };
-            return Some(Left { z, tip, beside: q });
-        };
+        let best = s - self.dir.mp * high(w2, 0.0).sqrt();
+        let at = low(high(best, 0.0), self.len);
         let h2 = w2 - (s - at) * (s - at);
-        if h2 < 0.0 {
-            return None;
-        }
         let tip = self.low.z + self.m * at;
-        let z = if self.tip.flat { tip } else { tip + r - h2.sqrt() };
-        Some(Left { z, tip, beside: q })
+        let up = if self.tip.flat { 0.0 } else { r - high(h2, 0.0).sqrt() };
+        // The free optimum of a flat cutter lies on the rim itself; round-off must not lose it.
+        let comes = w2 >= 0.0 && (h2 >= 0.0 || at == best);
+        Left { z: if comes { tip + up } else { f64::INFINITY }, tip, beside: q }
     }
 }

@@ -285,6 +285,84 @@ proptest! {
     }
 }
 
+/// One turn round the middle of the block, sinking from `z0` to `z1`, at a part of it.
+fn helix(radius_mm: f64, [z0, z1]: [f64; 2], part: f64) -> [f64; 3] {
+    let turn = part * std::f64::consts::TAU;
+    let (x, y) = (radius_mm * libm::cos(turn), radius_mm * libm::sin(turn));
+    [6.0 + x, 5.0 + y, z0 + (z1 - z0) * part]
+}
+
+/// Chords at most `off` from their helix leave what a cutter on the helix leaves, moved sideways by no more than that. The
+/// helix itself is searched at close places, half a step from the nearest of which adds to `off`.
+#[test]
+fn chords_of_circles_and_helices_leave_what_the_curve_leaves() {
+    let (radius, chords, samples) = (3.0, 200_u32, 1000_u32);
+    let half_chord = std::f64::consts::PI / f64::from(chords);
+    let sagitta = radius * (1.0 - libm::cos(half_chord));
+    let half_step = radius * std::f64::consts::PI / f64::from(samples);
+    for levels in [[-1.0, -1.0], [-0.5, -2.5], [-3.0, 0.1]] {
+        let slope = (levels[1] - levels[0]).abs() / (radius * std::f64::consts::TAU);
+        let at = |k: u32, n: u32| helix(radius, levels, f64::from(k) / f64::from(n));
+        let moves = chain(&(0..=chords).map(|k| at(k, chords)).collect::<Vec<_>>());
+        let places: Vec<DVec3> = (0..=samples).map(|k| DVec3::from_array(at(k, samples))).collect();
+        for profile in [BALL, FLAT].into_iter().chain(convex_forms()) {
+            let mut b = block(0.5);
+            b.cut(&profile, &moves);
+            let (grid, r) = (*b.field().grid(), profile.radius_mm());
+            let (off, sunk) = (1.1 * sagitta + half_step, slope * half_step + 1e-6);
+            for n in 0..grid.len() {
+                let p = grid.node(n % grid.nx, n / grid.nx);
+                let (mut low, mut high) = (0.0_f64, 0.0_f64);
+                for place in &places {
+                    let d = place.truncate().distance(p);
+                    if d - off <= r {
+                        low = low.min(place.z + profile.height_at((d - off).max(0.0)).unwrap());
+                    }
+                    if d + off <= r {
+                        high = high.min(place.z + profile.height_at(d + off).unwrap());
+                    }
+                }
+                let got = f64::from(b.field().z()[n]);
+                assert!(
+                    got >= low - sunk && got <= high + sunk,
+                    "{profile:?} {levels:?} {p}: {got}, not in {low} to {high}"
+                );
+            }
+        }
+    }
+}
+
+/// On a level circle the cutter leaves its own section, turned round the circle's middle: a torus groove by a ball, a ring of
+/// even depth by a flat. Chords move it inward by at most their sagitta.
+#[test]
+fn a_level_circle_leaves_the_section_of_the_cutter() {
+    let (radius, depth, chords) = (3.0, 1.0, 400_u32);
+    let sagitta = radius * (1.0 - libm::cos(std::f64::consts::PI / f64::from(chords)));
+    let at = |k: u32| helix(radius, [-depth; 2], f64::from(k) / f64::from(chords));
+    let moves = chain(&(0..=chords).map(at).collect::<Vec<_>>());
+    for profile in [BALL, FLAT].into_iter().chain(convex_forms()) {
+        let mut b = block(0.1);
+        b.cut(&profile, &moves);
+        let grid = *b.field().grid();
+        for n in 0..grid.len() {
+            let p = grid.node(n % grid.nx, n / grid.nx);
+            // The groove's middle lies on the circle, or inward by the sagitta.
+            let out = p.distance(DVec2::new(6.0, 5.0)) - radius;
+            let left = |aside: f64| profile.height_at(aside).map_or(0.0, |h| (h - depth).min(0.0));
+            let nearest = if out > 0.0 { out } else { (-out - sagitta).max(0.0) };
+            let farthest = if out > 0.0 { out + sagitta } else { -out };
+            let got = f64::from(b.field().z()[n]);
+            assert!(
+                got >= left((nearest - 1e-6).max(0.0)) - 1e-6
+                    && got <= left(farthest + 1e-6) + 1e-6,
+                "{profile:?} {p}: {got}, not in {} to {}",
+                left(nearest),
+                left(farthest)
+            );
+        }
+    }
+}
+
 #[test]
 fn the_result_does_not_hang_on_the_number_of_threads() {
     let moves: Vec<Move> = (0..200)
