@@ -9,7 +9,7 @@ mod lattice;
 mod sweep;
 
 use crate::cutter::{Profile, Turned};
-use crate::geom::{DVec2, DVec3, Grid, Heightfield, Move};
+use crate::geom::{DVec2, Grid, Heightfield, Move};
 use crate::job::Stock;
 use drawn::{Drawn, Reach};
 use lattice::{Batch, Lattice, for_nodes};

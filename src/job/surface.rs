@@ -263,9 +263,12 @@ impl Scheme {
     /// True when its surface goes through the vertices of the control mesh.
     pub fn interpolates(self) -> bool {
         match self {
-            Self::Butterfly | Self::ButterflyOriginal | Self::ButterflyRay => true,
+            Self::Butterfly
+            | Self::ButterflyOriginal
+            | Self::ButterflyRay
+            | Self::Kobbelt
+            | Self::Coons => true,
             Self::Loop | Self::Sqrt3 | Self::CatmullClark | Self::DooSabin => false,
-            Self::Kobbelt | Self::Coons => true,
         }
     }
 

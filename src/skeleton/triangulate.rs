@@ -282,7 +282,7 @@ mod tests {
     #[test]
     fn a_band_with_parallel_sides_is_regular_whichever_way_it_lies() {
         for turn in 0..12 {
-            let (s, c) = libm::sincos(f64::from(turn) * 0.523_6);
+            let (s, c) = libm::sincos(f64::from(turn) * 0.5);
             let lower = (0..=20).map(|k| (f64::from(k), 0.0));
             let upper = (0..=20).rev().map(|k| (f64::from(k), 1.5));
             let ring: Vec<_> = (lower.chain(upper))

@@ -163,7 +163,7 @@ impl Behind {
         let d = b * b - self.a * (e * e + mp2 * (across * across - r * r));
         let root = high(d, 0.0).sqrt();
         let round = Span::new((-b - root) * self.inv_a, (root - b) * self.inv_a);
-        straight.hull(round.only_if((d >= 0.0) & (mp >= 1e-9)))
+        straight.hull(round.only_if(d >= 0.0 && mp >= 1e-9))
     }
 
     /// The part of the strip `|q| <= R` on a row, by `u.x` times its height. The strip is not level.

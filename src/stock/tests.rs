@@ -301,7 +301,7 @@ fn chords_of_circles_and_helices_leave_what_the_curve_leaves() {
     let sagitta = radius * (1.0 - libm::cos(half_chord));
     let half_step = radius * std::f64::consts::PI / f64::from(samples);
     for levels in [[-1.0, -1.0], [-0.5, -2.5], [-3.0, 0.1]] {
-        let slope = (levels[1] - levels[0]).abs() / (radius * std::f64::consts::TAU);
+        let slope = f64::abs(levels[1] - levels[0]) / (radius * std::f64::consts::TAU);
         let at = |k: u32, n: u32| helix(radius, levels, f64::from(k) / f64::from(n));
         let moves = chain(&(0..=chords).map(|k| at(k, chords)).collect::<Vec<_>>());
         let places: Vec<DVec3> = (0..=samples).map(|k| DVec3::from_array(at(k, samples))).collect();

@@ -145,7 +145,9 @@ mod tests {
         assert_eq!((calm.cells.caps.len(), calm.cells.runs.len()), (2, 1));
         // The middle of an ellipse of 6 x 3: within the noise of the axis.
         let points = calm.spine.branches.iter().flat_map(|b| &b.points).map(|p| p.at);
-        points.for_each(|p| assert!(p.y.abs() < 0.06 * 1.5, "{p}"));
+        for p in points {
+            assert!(p.y.abs() < 0.06 * 1.5, "{p}");
+        }
     }
 
     /// A circle of radius r shrinks to r exp(-sigma^2 / (2 r^2)).
@@ -160,7 +162,9 @@ mod tests {
         for sigma in [2.0, 5.0, 12.0] {
             let radius = 50.0 * libm::exp(-sigma * sigma / 5000.0);
             let smooth = smoothed(&ring, sigma);
-            smooth.iter().for_each(|p| assert!((p.length() - radius).abs() < 2e-3, "{p} {sigma}"));
+            for p in smooth {
+                assert!((p.length() - radius).abs() < 2e-3, "{p} {sigma}");
+            }
         }
         assert_eq!(smoothed(&ring, 50.0), ring);
     }

@@ -143,7 +143,9 @@ mod tests {
         let mut mesh = PolyMesh::with_vertices((0..8).map(at).collect());
         let faces =
             [[0, 2, 3, 1], [0, 1, 5, 4], [1, 3, 7, 5], [3, 2, 6, 7], [2, 0, 4, 6], [4, 5, 7, 6]];
-        faces.iter().for_each(|face| mesh.add_face(face));
+        for face in faces {
+            mesh.add_face(&face);
+        }
         mesh
     }
 

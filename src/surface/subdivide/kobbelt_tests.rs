@@ -4,18 +4,18 @@ use super::super::coons::tests::{cube, grid, holds};
 use super::*;
 use crate::geom::DVec3;
 
-fn refined(mesh: PolyMesh, levels: usize) -> PolyMesh {
-    let quads = quads(&mesh).unwrap();
+fn refined(mesh: &PolyMesh, levels: usize) -> PolyMesh {
+    let quads = quads(mesh).unwrap();
     (0..levels).fold(quads, |mesh, _| step(&mesh, &Topology::of(&mesh).unwrap()))
 }
 
 #[test]
 fn the_cube_is_refined_as_tabled() {
-    let one = refined(cube(), 1);
+    let one = refined(&cube(), 1);
     for at in [[0.0, 1.092592593, 1.092592593], [0.0, 0.0, 1.365740741]] {
         assert!(holds(&one, at), "{at:?}");
     }
-    let two = refined(cube(), 2);
+    let two = refined(&cube(), 2);
     for at in [
         [0.573152435, 1.072220079, 1.072220079],
         [0.0, 0.597511574, 1.314525463],
@@ -29,7 +29,7 @@ fn the_cube_is_refined_as_tabled() {
 
 #[test]
 fn an_impulse_spreads_as_tabled() {
-    let fine = refined(grid(5, [2, 2]), 1);
+    let fine = refined(&grid(5, [2, 2]), 1);
     for at in
         [[2.5, 2.0, 0.5625], [2.5, 2.5, 0.31640625], [3.5, 2.0, -0.0625], [3.5, 2.5, -0.03515625]]
     {
@@ -72,5 +72,5 @@ fn polygons_are_cut_into_quadrilaterals_first() {
     let quads = quads(&mesh).unwrap();
     assert!(quads.faces().all(|f| f.len() == 4));
     assert_eq!(quads.len(), 4 * 4 + 3);
-    assert_eq!(refined(mesh, 2).len(), 16 * 19);
+    assert_eq!(refined(&mesh, 2).len(), 16 * 19);
 }

@@ -177,11 +177,14 @@ fn nullity(matrix: &[Vec<f64>], lambda: f64) -> usize {
             return n - step;
         }
         rows.swap(step, best.0);
-        rows.iter_mut().for_each(|row| row.swap(step, best.1));
+        for row in &mut rows {
+            row.swap(step, best.1);
+        }
         for i in step + 1..n {
             let part = rows[i][step] / rows[step][step];
-            for j in step..n {
-                rows[i][j] -= part * rows[step][j];
+            let pivot = rows[step].clone();
+            for (x, p) in rows[i].iter_mut().zip(pivot).skip(step) {
+                *x -= part * p;
             }
         }
     }
