@@ -19,6 +19,8 @@ use std::collections::BTreeMap;
 
 /// The box around the limit is found on so many faces, or more.
 const SIZED_FACES: usize = 1 << 14;
+/// Facets are as large as would do for cells of this part of the grid's: their edges are shorter than a cell.
+const FINER: f64 = 0.5;
 /// Most faces of the finest mesh.
 const MOST_FACES: usize = 1 << 22;
 /// A model flatter than this part of its size is flat.
@@ -179,7 +181,7 @@ impl Model {
     ) -> Result<[Mesh; 2], ModelError> {
         let control = self.placed(layer, spec);
         let corners: usize = control.mesh().faces().map(<[u32]>::len).sum();
-        let levels = spec.levels.unwrap_or_else(|| levels(control.mesh(), cell_mm));
+        let levels = spec.levels.unwrap_or_else(|| levels(control.mesh(), FINER * cell_mm));
         let faces = corners.saturating_mul(1 << (2 * levels.saturating_sub(1)));
         if faces > MOST_FACES {
             return Err(ModelError::TooFine { file: self.file.clone(), levels, faces });

@@ -174,7 +174,7 @@ fn the_target_is_the_limit_surface_at_the_nodes() {
     let surface = LimitSurface::of(control, |_, _| false).unwrap();
     // A side of a face is 10 mm long, halved five times it is shorter than 0.7 cells.
     let edge = 10.0 / 32.0;
-    assert_eq!(levels(control, 0.5), 5);
+    assert_eq!(levels(control, FINER * 0.5), 5);
     let (mut worst, mut bend, mut nodes) = (0.0_f64, 0.0_f64, 0);
     let (mut low, mut high) = (f64::INFINITY, 0.0_f64);
     for j in 0..=60_u32 {

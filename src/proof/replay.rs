@@ -407,7 +407,7 @@ impl Case<'_> {
         match m.kind {
             MoveKind::Rapid => {}
             MoveKind::Feed { feed_mm_per_min } => {
-                let limit = fastest_axis(m, self.setup.machine.max_rate_mm_per_min);
+                let limit = fastest_along(m, self.setup.machine.max_rate_mm_per_min);
                 if !(feed_mm_per_min > 0.0 && feed_mm_per_min <= limit) {
                     self.fail(FailureKind::Feed, m.line, m.to, feed_mm_per_min, limit);
                 } else if raced {
@@ -538,11 +538,16 @@ fn distance_to_rectangle(m: &Move, rectangle: Bounds) -> f64 {
     outside(0.5 * (low + high)).min(outside(0.0)).min(outside(1.0))
 }
 
-/// The highest rate among the axes that a move uses, mm/min.
-fn fastest_axis(m: &Move, max_rate: DVec3) -> f64 {
+/// The highest feed that the axes give along a move, mm/min: on a slant more than the rate of any of them. Never less than
+/// the highest rate among those it uses: the controller slows the others' part by itself. Programs round places: an axis
+/// may go a thousandth less far than the speed was meant for.
+fn fastest_along(m: &Move, max_rate: DVec3) -> f64 {
     let d = m.to - m.from;
-    let on = |d: f64, rate: f64| if d == 0.0 { 0.0 } else { rate };
-    on(d.x, max_rate.x).max(on(d.y, max_rate.y)).max(on(d.z, max_rate.z))
+    let used = || (0..3).filter(|&axis| d[axis] != 0.0);
+    let axis = used().map(|axis| max_rate[axis]).fold(0.0, f64::max);
+    let share = |axis: usize| ((d[axis].abs() - LENGTH_SLACK_MM) / d.length()).max(1e-9);
+    let along = used().map(|axis| max_rate[axis] / share(axis)).fold(f64::INFINITY, f64::min);
+    if along.is_finite() { axis.max(along) } else { axis }
 }
 
 /// All programs together must fit the machine: the stock stays where it is between them. Where the place of the zero

@@ -264,6 +264,28 @@ fn a_program_that_ends_in_wood_is_caught() {
     assert_caught(&flat_job(), &late, FailureKind::EndInWood, 14);
 }
 
+/// At 45 degrees two axes of 1000 mm/min make 1414.
+#[test]
+fn a_slant_may_be_faster_than_each_of_its_axes() {
+    let mut job = flat_job();
+    job.machine.max_rate_mm_per_min = DVec3::new(1000.0, 1000.0, 800.0);
+    let mut slant = |line: &'static str| {
+        let mut lines = broken(8, Some(line));
+        lines[12] = "G1 X35 F1000";
+        verdict(&job, &lines).unwrap()
+    };
+    let v = slant("G1 X15 Y15 F1410");
+    assert!(v.passed(), "{:#?}", v.failures);
+    let v = slant("G1 X15 Y15 F1420");
+    assert_eq!(
+        (v.failures.len(), v.failures[0].kind, v.failures[0].line),
+        (1, FailureKind::Feed, 8)
+    );
+    assert!((v.failures[0].limit - 1414.2).abs() < 0.3, "{}", v.failures[0].limit);
+    let v = slant("G1 X35 F1010");
+    assert_eq!((v.failures[0].kind, v.failures[0].limit), (FailureKind::Feed, 1000.0));
+}
+
 #[test]
 fn feed_and_speed_are_held_to_the_cutters_own_operations() {
     let f = assert_caught(&flat_job(), &broken(8, Some("G1 X35 F1800")), FailureKind::Feed, 8);

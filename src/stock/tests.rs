@@ -350,7 +350,7 @@ fn a_level_circle_leaves_the_section_of_the_cutter() {
             let out = p.distance(DVec2::new(6.0, 5.0)) - radius;
             let left = |aside: f64| profile.height_at(aside).map_or(0.0, |h| (h - depth).min(0.0));
             let nearest = if out > 0.0 { out } else { (-out - sagitta).max(0.0) };
-            let farthest = if out > 0.0 { out + sagitta } else { -out };
+            let farthest = out.abs().max((out + sagitta).abs());
             let got = f64::from(b.field().z()[n]);
             assert!(
                 got >= left((nearest - 1e-6).max(0.0)) - 1e-6

@@ -21,6 +21,9 @@ use crate::geom::{DVec2, DVec3};
 /// Inward tangents at the boundary lean away from their edge by at most this, radians.
 const MOST_LEAN: f64 = std::f64::consts::FRAC_PI_6;
 
+/// A ray leads inside when its part at right angles to the boundary is more than this.
+const LEAST_INWARD: f64 = 0.1;
+
 /// How long the handles of an edge's cubic are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Handle {
@@ -260,7 +263,7 @@ impl CoonsMesh {
             .map(|&end| {
                 let e = ray(end).normalize_or_zero();
                 if let Some(draft) = self.rules.draft_rad {
-                    return (end, drafted(forward - backward, draft));
+                    return (end, drafted(forward - backward, e, draft));
                 }
                 let known = !self.topology.is_boundary(self.far(end));
                 let g = -self.at_end((end.0, 1 - end.1));
@@ -343,7 +346,9 @@ impl CoonsMesh {
                     .try_normalize()
                     .unwrap_or_else(|| (here - middle.at).normalize_or_zero())
             }
-            (None, Some(draft)) => drafted(middle.along(&self.topology, h), draft),
+            (None, Some(draft)) => {
+                drafted(middle.along(&self.topology, h), here - middle.at, draft)
+            }
             (None, None) => (here - middle.at).normalize_or_zero(),
         }
     }
@@ -411,12 +416,13 @@ fn laid(ray: DVec3, normal: DVec3) -> DVec3 {
     flat.try_normalize().unwrap_or_else(|| ray.normalize_or_zero())
 }
 
-/// The direction that leaves the boundary at right angles and rises by an angle; the boundary runs along `along`, inside to
-/// the left.
-fn drafted(along: DVec3, draft: f64) -> DVec3 {
+/// The direction over `ray` in the plane that holds the boundary and rises from it by an angle; the boundary runs along
+/// `along`, inside to the left. A ray that does not lead inside gives way to the direction at right angles.
+fn drafted(along: DVec3, ray: DVec3, draft: f64) -> DVec3 {
     let inward = DVec2::new(along.x, along.y).normalize_or_zero().perp();
-    let (sin, cos) = libm::sincos(draft);
-    (cos * inward).extend(sin)
+    let ray = ray.truncate().normalize_or_zero();
+    let plan = if ray.dot(inward) > LEAST_INWARD { ray } else { inward };
+    plan.extend(libm::tan(draft) * plan.dot(inward)).normalize_or_zero()
 }
 
 #[cfg(test)]
