@@ -318,7 +318,10 @@ impl CoonsMesh {
         let e: Vec<DVec3> = sides.iter().map(|&h| middles[topology.edge(h) as usize].at).collect();
         let count = sides.len() as f64;
         let sum = |points: &[DVec3]| points.iter().sum::<DVec3>();
-        let at = (2.0 * sum(&e) - sum(&p)) / count;
+        // Exact for quadratic surfaces over a regular polygon; over a quadrilateral it is the Coons patch's middle.
+        let sine = libm::sin(std::f64::consts::PI / count);
+        let of_middle = 1.0 / (count * sine * sine);
+        let at = of_middle * sum(&e) + (1.0 / count - of_middle) * sum(&p);
         let rays: Vec<DVec3> = e.iter().map(|&e| e - at).collect();
         let to = if let [a, b, c, d] = sides[..] {
             let on = |h: u32| middles[topology.edge(h) as usize].derivative(topology, h);
@@ -329,8 +332,22 @@ impl CoonsMesh {
             let v = v.try_normalize().unwrap_or_else(|| (e[2] - e[0]).normalize_or_zero());
             vec![-v, u, v, -u]
         } else {
-            let normal = normal_of(&rays);
-            rays.iter().map(|&ray| laid(ray, normal)).collect()
+            // Along the parabolas from what lies opposite: a vertex, or with an even number of sides a side's middle.
+            let half = sides.len() / 2;
+            let slopes: Vec<DVec3> = (0..sides.len())
+                .map(|k| {
+                    let opposite = if sides.len() % 2 == 0 {
+                        e[(k + half) % e.len()]
+                    } else {
+                        p[(k + half + 1) % p.len()]
+                    };
+                    let (back, on) = (at - opposite, rays[k]);
+                    let (b, o) = (back.length(), on.length());
+                    if b > 0.0 && o > 0.0 { (back / b * o + on / o * b) / (b + o) } else { on }
+                })
+                .collect();
+            let normal = normal_of(&slopes);
+            slopes.iter().map(|&slope| laid(slope, normal)).collect()
         };
         Centre { at, to }
     }
