@@ -545,9 +545,12 @@ fn fastest_along(m: &Move, max_rate: DVec3) -> f64 {
     let d = m.to - m.from;
     let used = || (0..3).filter(|&axis| d[axis] != 0.0);
     let axis = used().map(|axis| max_rate[axis]).fold(0.0, f64::max);
+    if used().count() < 2 {
+        return axis;
+    }
     let share = |axis: usize| ((d[axis].abs() - LENGTH_SLACK_MM) / d.length()).max(1e-9);
     let along = used().map(|axis| max_rate[axis] / share(axis)).fold(f64::INFINITY, f64::min);
-    if along.is_finite() { axis.max(along) } else { axis }
+    axis.max(along)
 }
 
 /// All programs together must fit the machine: the stock stays where it is between them. Where the place of the zero
