@@ -547,6 +547,12 @@ fn jobs_that_cannot_be_carved_are_refused() {
         1,
         &["pitch_mm"],
     );
+    refused(
+        &job_with("file = \"leaf.svg\"", "file = \"shell.obj\""),
+        &["carve", "leaf.toml"],
+        1,
+        &["leaf.toml:4:8", "mesh = "],
+    );
 }
 
 #[test]

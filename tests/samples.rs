@@ -51,7 +51,7 @@ fn carve_with(sample: &Path, methods: &[&str]) {
         job = lines.join("\n") + "\n";
     }
     if std::env::var_os("RELIEVO_SAMPLES").is_none_or(|v| v != "full") {
-        for (key, coarse) in [("pitch_mm = ", "0.4"), ("scallop_mm = ", "0.05")] {
+        for (key, coarse) in [("pitch_mm = ", "0.5"), ("scallop_mm = ", "0.08")] {
             let change = |line: &str| match line.strip_prefix(key) {
                 Some(_) => format!("{key}{coarse}"),
                 None => line.to_owned(),

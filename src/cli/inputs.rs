@@ -71,6 +71,10 @@ pub(super) fn load(path: &Path) -> Result<Input> {
         draft.refuse_picture_keys()?;
         return Ok(input(draft, Artwork::none()));
     }
+    if artwork_file.extension().is_some_and(|e| e.eq_ignore_ascii_case("obj")) {
+        let message = "a mesh is no artwork: take this line out and give a layer the line mesh = \"FILE.obj\"";
+        return Err(draft.unreadable_artwork(message).into());
+    }
     let bytes = match files::read(&artwork_file) {
         Err(e) if artwork_file != path => {
             return Err(draft.unreadable_artwork(&format!("{e:#}")).into());

@@ -21,47 +21,75 @@ pub(super) struct Cell {
     pub pitch_mm: f64,
     /// Heights at (0,0), (1,0), (0,1), (1,1), mm.
     pub z: [f64; 4],
+    /// Whether it is the last of its row, and of its column.
+    pub rims: (bool, bool),
+}
+
+/// Contacts with the two facets of a cell, the lower (with the corner at (1,0)) first.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Facets {
+    /// Tip height at which the cutter touches the inside of one of them.
+    pub tip: f64,
+    /// Tip heights over the planes of both, each as if its facet had no end: none of the facet's contacts is higher, those on
+    /// its edges included.
+    pub planes: [f64; 2],
 }
 
 impl Cell {
-    /// Tip height at which the cutter touches the two facets and five edges of the cell. Contacts on the inside of edges
-    /// that are no higher than `floor` may be left out, and so may vertices of convex forms.
+    /// Square of the distance from the axis to the nearest point of the cell, mm^2.
+    #[inline]
+    pub(super) fn nearest_squared(&self) -> f64 {
+        self.at.max(-(self.at + self.pitch_mm)).max(DVec2::ZERO).length_squared()
+    }
+
+    /// Tip height at which the cutter touches the cell: its two facets, and of its edges those at the left, below and across.
+    /// The other two are the neighbours' (this cell's own at the rim of the grid). Contacts that are no higher than `floor`
+    /// may be left out, and so may vertices of convex forms.
     pub(super) fn touch(&self, profile: &Profile, floor: f64) -> f64 {
         let (a, p) = (self.at, self.pitch_mm);
-        let (b, c, d) = (a + DVec2::X * p, a + DVec2::Y * p, a + DVec2::splat(p));
-        let mut best = self.touch_facets(profile);
-        let ends = [a, b, c, d];
-        let edges = [(0, 1), (0, 2), (0, 3), (1, 3), (2, 3)];
+        let ends = [a, a + DVec2::X * p, a + DVec2::Y * p, a + DVec2::splat(p)];
+        let facets = self.touch_facets(profile);
+        let [lower, upper] = facets.planes;
+        let edges = [
+            (0, 1, lower, true),
+            (0, 2, upper, true),
+            (0, 3, lower.min(upper), true),
+            (1, 3, lower, self.rims.0),
+            (2, 3, upper, self.rims.1),
+        ];
+        let mut best = facets.tip;
         if let Profile::Turned(form) = profile
             && ends.iter().all(|end| end.length() <= form.radius_mm())
         {
             let heights = ends.map(|end| form.height_and_slope(end.length()));
-            for (from, to) in edges {
+            for (from, to, plane, own) in edges {
                 let floor = best.max(floor);
                 let end = |n: usize| End { at: ends[n], z: self.z[n], profile: heights[n] };
-                if bends_above(&end(from), &end(to), floor) {
+                if own && plane > floor && bends_above(&end(from), &end(to), floor) {
                     let (a, b) = (ends[from], ends[to]);
                     best = best.max(edge(profile, a, self.z[from], b, self.z[to]));
                 }
             }
             return best;
         }
-        for (from, to) in edges {
-            best = best.max(edge(profile, ends[from], self.z[from], ends[to], self.z[to]));
+        for (from, to, plane, own) in edges {
+            if own && plane > best.max(floor) {
+                best = best.max(edge(profile, ends[from], self.z[from], ends[to], self.z[to]));
+            }
         }
         best
     }
 
-    /// Tip height at which the cutter touches the inside of one of the two facets.
-    pub(super) fn touch_facets(&self, profile: &Profile) -> f64 {
+    /// Contacts with the two facets.
+    pub(super) fn touch_facets(&self, profile: &Profile) -> Facets {
         let [z00, z10, z01, z11] = self.z;
         let lower = DVec2::new(z10 - z00, z11 - z10) / self.pitch_mm;
         let upper = DVec2::new(z11 - z01, z01 - z00) / self.pitch_mm;
-        let mut best = f64::NEG_INFINITY;
-        for (slope, is_lower) in [(lower, true), (upper, false)] {
+        let mut facets = Facets { tip: f64::NEG_INFINITY, planes: [f64::NEG_INFINITY; 2] };
+        for (n, slope) in [lower, upper].into_iter().enumerate() {
+            let steepness = slope.length();
             let (contact, tip) = match *profile {
                 Profile::Turned(ref form) => {
-                    let steepness = slope.length();
                     let r = form.touch(steepness);
                     let contact =
                         if steepness > 0.0 { slope * (r / steepness) } else { DVec2::ZERO };
@@ -73,19 +101,21 @@ impl Cell {
                 }
                 // The highest point of a tilted disc is its rim point uphill.
                 Profile::Flat { radius_mm } => {
-                    let steepness = slope.length();
                     let contact =
                         if steepness > 0.0 { slope * (radius_mm / steepness) } else { DVec2::ZERO };
                     (contact, radius_mm * steepness)
                 }
             };
+            let plane = z00 - slope.dot(self.at) + tip;
+            // Round-off of coordinates: an edge may be touched a hair beyond the rim.
+            facets.planes[n] = plane + TOUCH_MM * (1.0 + steepness);
             let inside = (contact - self.at) / self.pitch_mm;
-            let (long, short) = if is_lower { (inside.x, inside.y) } else { (inside.y, inside.x) };
+            let (long, short) = if n == 0 { (inside.x, inside.y) } else { (inside.y, inside.x) };
             if short >= 0.0 && short <= long && long <= 1.0 {
-                best = best.max(z00 - slope.dot(self.at) + tip);
+                facets.tip = facets.tip.max(plane);
             }
         }
-        best
+        facets
     }
 }
 

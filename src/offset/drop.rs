@@ -46,6 +46,8 @@ struct Search<'d> {
     best: f64,
     /// What the highest contact is known to exceed or equal: the best, or vertices seen in `f32`.
     floor: f64,
+    /// A contact above this ends the search.
+    enough: f64,
     /// The leaf of that contact.
     best_leaf: Block,
     /// Leaves whose facets and edges could beat the best vertex: (highest possible tip, leaf).
@@ -66,9 +68,10 @@ impl<'a> Dropper<'a> {
         self.search(&self.profile, p, None).0
     }
 
-    /// True when the tip may be at height `z_mm` over `p`, as [`Dropper::drop`] says, but much cheaper where it may.
+    /// True when the tip may be at height `z_mm` over `p`, as [`Dropper::drop`] says, but much cheaper.
     pub fn clears(&self, p: DVec2, z_mm: f64) -> bool {
-        self.search_above(&self.profile, p, None, z_mm).0 <= z_mm
+        let (tip, _) = self.search_above(&self.profile, p, None, (z_mm, z_mm));
+        tip <= z_mm
     }
 
     /// The highest point of the surface under the closed disc of the cutter at `p`, mm;
@@ -96,16 +99,17 @@ impl<'a> Dropper<'a> {
 
     /// The tip and the leaf of the contact; `near` is a leaf that may lie close to it.
     fn search(&self, profile: &Profile, p: DVec2, near: Option<Block>) -> (f64, Block) {
-        self.search_above(profile, p, near, f64::NEG_INFINITY)
+        self.search_above(profile, p, near, (f64::NEG_INFINITY, f64::INFINITY))
     }
 
-    /// [`Dropper::search`]; contacts that are no higher than `known_mm` need not be found.
+    /// [`Dropper::search`]; contacts that are no higher than `known_mm` need not be found, and once one is higher than
+    /// `enough_mm` no higher one is looked for.
     fn search_above(
         &self,
         profile: &Profile,
         p: DVec2,
         near: Option<Block>,
-        known_mm: f64,
+        (known_mm, enough_mm): (f64, f64),
     ) -> (f64, Block) {
         let mut search = Search {
             surface: self.surface,
@@ -115,6 +119,7 @@ impl<'a> Dropper<'a> {
             p,
             best: f64::NEG_INFINITY,
             floor: known_mm,
+            enough: enough_mm,
             best_leaf: (0, 0),
             waiting: [(0.0, (0, 0)); WAITING],
             waiting_len: 0,
@@ -123,8 +128,10 @@ impl<'a> Dropper<'a> {
             Some(near) => search.scout(near),
             None => search.guess(),
         }
-        search.start();
-        search.finish();
+        if search.best <= enough_mm {
+            search.start();
+            search.finish();
+        }
         (search.best, search.best_leaf)
     }
 }
@@ -214,19 +221,10 @@ impl Search<'_> {
             } else {
                 self.visit(depth - 1, block);
             }
+            if self.best > self.enough {
+                return;
+            }
         }
-    }
-
-    /// Square of the distance from the axis to the nearest point of a square of cells.
-    #[inline]
-    fn nearest(&self, (i, j): (usize, usize), cells: usize) -> f64 {
-        let grid = self.grid();
-        let lo = DVec2::new(i as f64, j as f64) * grid.pitch_mm + (grid.origin - self.p);
-        let hi =
-            DVec2::new((i + cells).min(grid.nx - 1) as f64, (j + cells).min(grid.ny - 1) as f64)
-                * grid.pitch_mm
-                + (grid.origin - self.p);
-        lo.max(-hi).max(DVec2::ZERO).length_squared()
     }
 
     /// Tip height over a contact at height `z` at a distance from the axis, given as its square.
@@ -380,7 +378,7 @@ impl Search<'_> {
     fn finish(&mut self) {
         let waiting = self.waiting;
         for &(bound, leaf) in &waiting[..self.waiting_len] {
-            if bound > self.floor {
+            if bound > self.floor && self.best <= self.enough {
                 match self.bulge(leaf) {
                     Some(bulge) => self.facets(leaf, bulge),
                     None => self.cells(leaf),
@@ -402,22 +400,36 @@ impl Search<'_> {
     /// The cell (i, j) relative to the axis.
     #[inline]
     fn cell(&self, i: usize, j: usize) -> Cell {
+        self.cell_of([self.surface.row(j), self.surface.row(j + 1)], i, j)
+    }
+
+    /// The cell (i, j) between these two rows.
+    #[inline]
+    fn cell_of(&self, [below, above]: [&[f32]; 2], i: usize, j: usize) -> Cell {
         let grid = self.grid();
         let at = DVec2::new(i as f64, j as f64) * grid.pitch_mm + (grid.origin - self.p);
-        let (below, above) = (self.surface.row(j), self.surface.row(j + 1));
-        let z = [below[i], below[i + 1], above[i], above[i + 1]].map(f64::from);
-        Cell { at, pitch_mm: grid.pitch_mm, z }
+        // Written out: calls of closures cost as much as the rest where little is optimised.
+        let z = [
+            f64::from(below[i]),
+            f64::from(below[i + 1]),
+            f64::from(above[i]),
+            f64::from(above[i + 1]),
+        ];
+        let rims = (i + 2 == grid.nx, j + 2 == grid.ny);
+        Cell { at, pitch_mm: grid.pitch_mm, z, rims }
     }
 
     /// Touches every cell of a leaf that may beat the best contact.
     fn cells(&mut self, (x, y): Block) {
+        let surface = self.surface;
         let (nx, ny) = (self.grid().nx, self.grid().ny);
         for j in y * FAN..(y * FAN + FAN).min(ny - 1) {
+            let rows = [surface.row(j), surface.row(j + 1)];
             for i in x * FAN..(x * FAN + FAN).min(nx - 1) {
-                let cell = self.cell(i, j);
-                let top = cell.z.into_iter().fold(f64::NEG_INFINITY, f64::max);
+                let cell = self.cell_of(rows, i, j);
+                let top = cell.z[0].max(cell.z[1]).max(cell.z[2].max(cell.z[3]));
                 if top > self.floor
-                    && self.tip_below(top, self.nearest((i, j), 1)) > self.floor
+                    && self.tip_below(top, cell.nearest_squared()) > self.floor
                     && self.ceiling(&cell) > self.floor
                 {
                     self.raise(cell.touch(self.profile, self.floor), (x, y));
@@ -430,14 +442,20 @@ impl Search<'_> {
     /// middle, and what a facet stands above that is highest at a corner.
     #[inline]
     fn ceiling(&self, cell: &Cell) -> f64 {
-        let Profile::Turned(form) = self.profile else { return f64::INFINITY };
         let half = 0.5 * cell.pitch_mm;
         let middle = cell.at + half;
         let away = middle.length();
         if away > self.radius_mm {
             return f64::INFINITY;
         }
-        let (rise, slope) = form.height_and_slope(away);
+        let (rise, slope) = match *self.profile {
+            Profile::Turned(ref form) => form.height_and_slope(away),
+            Profile::Ball { radius_mm: r } => {
+                let w = (r * r - away * away).max(0.0).sqrt();
+                (r - w, away / w)
+            }
+            Profile::Flat { .. } => return f64::INFINITY,
+        };
         if !slope.is_finite() {
             return f64::INFINITY;
         }
@@ -469,8 +487,8 @@ impl Search<'_> {
         while cells != 0 {
             let (di, dj) = node(cells.trailing_zeros());
             cells &= cells - 1;
-            let tip = self.cell(x * FAN + di, y * FAN + dj).touch_facets(self.profile);
-            self.raise(tip, (x, y));
+            let facets = self.cell(x * FAN + di, y * FAN + dj).touch_facets(self.profile);
+            self.raise(facets.tip, (x, y));
         }
         for (a, b) in [(1, 0), (0, 1), (1, 1)] {
             let mut edges = (hot | hot >> (a + 8 * b)) & bits(columns + 1 - a, lines + 1 - b);

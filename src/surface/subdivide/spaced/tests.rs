@@ -177,9 +177,8 @@ fn a_board_with_spacings_is_refined_as_tabled() {
     assert_eq!(spacing_between(edge_of(&coarse, 5, 6), face_of(&coarse, 4)), 1.5);
 }
 
-/// Test N2.
-#[test]
-fn a_fan_of_five_with_one_long_spoke_is_refined_as_tabled() {
+/// The fan of test N2, the spoke to vertex 1 and the outer edges that it runs along longer than the others.
+fn fan_of_five(long: f64) -> SpacedMesh {
     let mut mesh = PolyMesh::with_vertices(vec![DVec3::Z]);
     for k in 0..10_u32 {
         let angle = (36.0 * f64::from(k)).to_radians();
@@ -190,10 +189,15 @@ fn a_fan_of_five_with_one_long_spoke_is_refined_as_tabled() {
     for k in 0..5 {
         mesh.add_face(&[0, 2 * k + 1, 2 * k + 2, (2 * k + 2) % 10 + 1]);
     }
-    // The spoke to vertex 1 and the outer edges that it runs along: 2-3 and 9-10.
-    let long = [[0, 1], [2, 3], [9, 10]];
-    let spacing = |a: u32, b: u32| if long.contains(&[a.min(b), a.max(b)]) { 2.0 } else { 1.0 };
-    let coarse = SpacedMesh::with_spacings(mesh, spacing);
+    let parallel = [[0, 1], [2, 3], [9, 10]];
+    let is_long = |a: u32, b: u32| parallel.contains(&[a.min(b), a.max(b)]);
+    SpacedMesh::with_spacings(mesh, |a, b| if is_long(a, b) { long } else { 1.0 })
+}
+
+/// Test N2.
+#[test]
+fn a_fan_of_five_with_one_long_spoke_is_refined_as_tabled() {
+    let coarse = fan_of_five(2.0);
     let fine = coarse.refined(1).unwrap();
     let v = &fine.mesh.vertices;
     close(v[0], [-0.059793279, 0.0, 0.612556455]);
@@ -201,6 +205,60 @@ fn a_fan_of_five_with_one_long_spoke_is_refined_as_tabled() {
     close(v[edge_of(&coarse, 0, 3)], [0.059836166, 0.579546988, 0.3]);
     close(v[face_of(&coarse, 0)], [0.535410197, 0.461652531, 0.2]);
     close(v[face_of(&coarse, 2)], [-0.837026198, 0.0, 0.068047337]);
+}
+
+/// Sign of the determinant of a square matrix less a multiple of the identity.
+fn sign_less(matrix: &[Vec<f64>], lambda: f64) -> f64 {
+    let mut a = matrix.to_vec();
+    let mut sign = 1.0;
+    for k in 0..a.len() {
+        a[k][k] -= lambda;
+    }
+    for k in 0..a.len() {
+        let pivot = (k..a.len()).max_by(|&i, &j| a[i][k].abs().total_cmp(&a[j][k].abs())).unwrap();
+        if pivot != k {
+            a.swap(k, pivot);
+            sign = -sign;
+        }
+        sign *= a[k][k].signum();
+        for i in k + 1..a.len() {
+            let factor = a[i][k] / a[k][k];
+            for j in k..a.len() {
+                a[i][j] -= factor * a[k][j];
+            }
+        }
+    }
+    sign
+}
+
+/// Section 2.2, quality limits: the two eigenvalues after 1 of the step about a vertex of five edges, one r times as long.
+#[test]
+fn a_long_spoke_draws_the_leading_eigenvalues_apart_as_tabled() {
+    let tabled =
+        [(2.0, 0.5927, 0.5291, 5e-5), (3.0, 0.6233, 0.5301, 5e-5), (10.0, 0.718, 0.582, 5e-4)];
+    for (long, first, second, digit) in tabled {
+        let mut matrix = vec![vec![0.0; 11]; 11];
+        for from in 0..11 {
+            let mut coarse = fan_of_five(long);
+            for (v, at) in coarse.mesh.vertices.iter_mut().enumerate() {
+                at.z = if v == from { 1.0 } else { 0.0 };
+            }
+            let fine = coarse.refined(1).unwrap();
+            for to in 0..11_u32 {
+                let now = match to {
+                    0 => 0,
+                    _ if to % 2 == 1 => edge_of(&coarse, 0, to),
+                    _ => face_of(&coarse, to as usize / 2 - 1),
+                };
+                matrix[to as usize][from] = fine.mesh.vertices[now].z;
+            }
+        }
+        for one in [first, second] {
+            let (below, above) = (sign_less(&matrix, one - digit), sign_less(&matrix, one + digit));
+            assert_ne!(below, above, "spoke {long}: {one}");
+        }
+        assert_eq!(sign_less(&matrix, first + digit), sign_less(&matrix, 1.0 - 1e-9), "{long}");
+    }
 }
 
 fn cube() -> PolyMesh {
