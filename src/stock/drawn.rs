@@ -350,7 +350,8 @@ impl Shape<2> for Drawn<'_> {
     fn pieces(&self, lattice: &Lattice, rows: [usize; 2], pieces: &mut Vec<Piece>) -> bool {
         let Some(reach) = self.reach else { return false };
         let r = self.form.radius_mm();
-        if self.len > r {
+        // Along X the rows are such slices already.
+        if self.len > r || self.u.y.abs() < PARALLEL {
             return false;
         }
         let slices = ((r / lattice.grid.pitch_mm).ceil()).clamp(1.0, MOST_SLICES);
