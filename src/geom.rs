@@ -20,6 +20,7 @@ pub(crate) mod edge_grid;
 mod heightfield;
 mod moves;
 mod polygon;
+pub(crate) mod simd;
 
 pub use distance::distance_field;
 pub use glam::{DVec2, DVec3, DVec4};

@@ -9,11 +9,13 @@ mod lattice;
 mod sweep;
 
 use crate::cutter::{Profile, Turned};
+use crate::geom::simd::{self, Kernel, Path};
 use crate::geom::{DVec2, Grid, Heightfield, Move};
 use crate::job::Stock;
 use drawn::{Drawn, Reach};
-use lattice::{Batch, Lattice, for_nodes};
+use lattice::{BATCH, Batch, LANES, Lattice, Shape, Sink, for_nodes};
 use rayon::prelude::*;
+use std::ops::Range;
 use sweep::{Joint, Sweep, Tip, high};
 
 /// What a move met.
@@ -60,6 +62,9 @@ pub struct Block {
 
 /// Rows of nodes that one task carves.
 const BAND_ROWS: usize = 64;
+
+/// Moves that are carved by all tasks before the next ones are prepared: bounds what must be held for each.
+const MOVES_AT_ONCE: usize = 1 << 20;
 
 /// Widest wedge at a joint that counts as thin, nodes.
 const THIN_NODES: f64 = 2.0;
@@ -137,22 +142,23 @@ impl Block {
         let slim = Tip::of(&profile.slimmed(RAPID_SLIM_MM));
         // A wedge up to a few nodes wide costs less as part of a strip than as a stamp of its own.
         let thin_mm = THIN_NODES * self.field.grid().pitch_mm;
-        let joints: Vec<Joint> = (0..moves.len() + 1)
-            .into_par_iter()
-            .with_min_len(1024)
-            .map(|k| match (k.checked_sub(1), moves.get(k)) {
-                (Some(i), Some(next)) if !alone(i) && !alone(k) => {
-                    Joint::of(&moves[i], next, tip, thin_mm)
-                }
-                _ => Joint::None,
-            })
-            .collect();
+        let joints = |part: Range<usize>| -> Vec<Joint> {
+            (part.start..part.end + 1)
+                .into_par_iter()
+                .with_min_len(1024)
+                .map(|k| match (k.checked_sub(1), moves.get(k)) {
+                    (Some(i), Some(next)) if !alone(i) && !alone(k) => {
+                        Joint::of(&moves[i], next, tip, thin_mm)
+                    }
+                    _ => Joint::None,
+                })
+                .collect()
+        };
         let top_mm = self.top_mm;
-        self.carve(tip.radius, moves, |band, k, contact| {
-            let ends = [joints[k], joints[k + 1]];
+        self.carve(tip.radius, moves, joints, |[start, end], band, k, contact| {
             let tip_here = if moves[k].is_rapid() { slim } else { tip };
-            band.carve(&Sweep::of(&moves[k], tip_here, ends), contact);
-            if ends[1] == Joint::Wedge
+            band.carve(&Sweep::of(&moves[k], tip_here, [start, end]), contact);
+            if end == Joint::Wedge
                 && moves[k].to.z < top_mm
                 && let Some(wedge) = Sweep::wedge(&moves[k], &moves[k + 1], tip)
             {
@@ -178,7 +184,8 @@ impl Block {
             let (a, b) = (&moves[k - 1], &moves[k]);
             a.to == b.from && a.is_rapid() == b.is_rapid() && !alone(k - 1) && !alone(k)
         };
-        self.carve(form.radius_mm(), moves, |band, k, contact| {
+        let no_joints = |part: Range<usize>| vec![Joint::None; part.len() + 1];
+        self.carve(form.radius_mm(), moves, no_joints, |_, band, k, contact| {
             let m = &moves[k];
             let follows = k > 0 && goes_on(k);
             let next = moves.get(k + 1).filter(|_| goes_on(k + 1));
@@ -191,39 +198,46 @@ impl Block {
         })
     }
 
-    /// Carves every band with its moves, in order: `one` removes what move k takes from a band.
+    /// Carves every band with its moves, in order: `one` removes what move k takes from a band, knowing the joints at its
+    /// start and its end. `joints` gives those of a part of the moves, one more than these.
     fn carve(
         &mut self,
         radius_mm: f64,
         moves: &[Move],
-        one: impl Fn(&mut Band, usize, &mut Contact) + Sync,
+        joints: impl Fn(Range<usize>) -> Vec<Joint>,
+        one: impl Fn([Joint; 2], &mut Band, usize, &mut Contact) + Sync,
     ) -> Vec<Contact> {
         let mut contacts = vec![Contact::default(); moves.len()];
-        let lattice = Lattice::new(*self.field.grid());
-        let bins = self.bins(radius_mm, moves);
-        let parts: Vec<Vec<(u32, Contact)>> = self
-            .field
-            .z_mut()
-            .par_chunks_mut(lattice.grid.nx * BAND_ROWS)
-            .zip(bins)
-            .enumerate()
-            .map(|(b, (z, bin))| {
-                let batch = &mut Batch::new();
-                let mut band = Band { lattice, row0: b * BAND_ROWS, z, batch };
-                let mut met = Vec::new();
-                for k in bin {
-                    let mut contact = Contact::default();
-                    one(&mut band, k as usize, &mut contact);
-                    if contact.deepest_mm > 0.0 {
-                        met.push((k, contact));
+        let (lattice, path) = (Lattice::new(*self.field.grid()), Path::best());
+        for start in (0..moves.len()).step_by(MOVES_AT_ONCE) {
+            let part = start..moves.len().min(start + MOVES_AT_ONCE);
+            let joints = joints(part.clone());
+            let bins = self.bins(radius_mm, &moves[part]);
+            let parts: Vec<Vec<(u32, Contact)>> = self
+                .field
+                .z_mut()
+                .par_chunks_mut(lattice.grid.nx * BAND_ROWS)
+                .zip(bins)
+                .enumerate()
+                .map(|(b, (z, bin))| {
+                    let batch = &mut Batch::new();
+                    let mut band = Band { lattice, path, row0: b * BAND_ROWS, z, batch };
+                    let mut met = Vec::new();
+                    for k in bin {
+                        let at = k as usize;
+                        let mut contact = Contact::default();
+                        one([joints[at], joints[at + 1]], &mut band, start + at, &mut contact);
+                        if contact.deepest_mm > 0.0 {
+                            met.push((k, contact));
+                        }
                     }
-                }
-                met
-            })
-            .collect();
-        for (k, contact) in parts.into_iter().flatten() {
-            let c = &mut contacts[k as usize];
-            *c = c.worst(contact);
+                    met
+                })
+                .collect();
+            for (k, contact) in parts.into_iter().flatten() {
+                let c = &mut contacts[start + k as usize];
+                *c = c.worst(contact);
+            }
         }
         contacts
     }
@@ -284,14 +298,30 @@ impl Block {
         let sweep = Sweep::of(mv, Tip::of(&Profile::Flat { radius_mm }), [Joint::None; 2]);
         let (lo, hi) = sweep.y_range();
         let (j0, j1) = lattice.rows(lo, hi, 0, lattice.grid.ny)?;
-        let mut worst: Option<Touch> = None;
-        for_nodes(&lattice, &mut Batch::new(), &sweep, [j0, j1], |i, j, left| {
-            let depth_mm = f64::from(self.field.at(i, j)) - (left.z + above_tip_mm);
-            if depth_mm > worst.map_or(0.0, |w| w.depth_mm) {
-                worst = Some(Touch { at: lattice.grid.node(i, j), depth_mm });
+        let mut search = Search { block: self, above_tip_mm, worst: None };
+        for_nodes(&lattice, &mut Batch::new(), &sweep, [j0, j1], &mut search);
+        search.worst
+    }
+}
+
+/// Looks for the deepest place in the wood of something that does not cut.
+struct Search<'a> {
+    block: &'a Block,
+    above_tip_mm: f64,
+    worst: Option<Touch>,
+}
+
+impl Sink for Search<'_> {
+    #[inline(always)]
+    fn take<const N: usize>(&mut self, _: &impl Shape<N>, batch: &mut Batch) {
+        let field = &self.block.field;
+        for k in 0..batch.len {
+            let (i, j) = (batch.column[k] as usize, batch.line[k] as usize);
+            let depth_mm = f64::from(field.at(i, j)) - (batch.z[k] + self.above_tip_mm);
+            if depth_mm > self.worst.map_or(0.0, |w| w.depth_mm) {
+                self.worst = Some(Touch { at: field.grid().node(i, j), depth_mm });
             }
-        });
-        worst
+        }
     }
 }
 
@@ -322,6 +352,7 @@ fn across_stadium(a: DVec2, b: DVec2, r: f64, y: f64) -> Option<(f64, f64)> {
 /// Some rows of the wood.
 struct Band<'a> {
     lattice: Lattice,
+    path: Path,
     row0: usize,
     z: &'a mut [f32],
     batch: &'a mut Batch,
@@ -329,30 +360,120 @@ struct Band<'a> {
 
 impl Band<'_> {
     fn carve(&mut self, sweep: &Sweep, contact: &mut Contact) {
-        let nx = self.lattice.grid.nx;
-        let rows_here = self.z.len() / nx;
+        let rows_here = self.z.len() / self.lattice.grid.nx;
         let (lo, hi) = sweep.y_range();
         let Some((j0, j1)) = self.lattice.rows(lo, hi, self.row0, self.row0 + rows_here) else {
             return;
         };
-        let (mut deepest, mut engaged, mut ahead) = (0.0_f32, 0.0_f64, f64::NEG_INFINITY);
-        for_nodes(&self.lattice, self.batch, sweep, [j0, j1], |i, j, left| {
-            let node = &mut self.z[(j - self.row0) * nx + i];
-            let (old, new) = (*node, left.z as f32);
-            if new < old {
-                *node = new;
-                deepest = if old - new > deepest { old - new } else { deepest };
-                let wood = f64::from(old);
-                let (removed_mm, high_mm) = (wood - left.z, wood - left.tip);
+        *contact = contact.worst(simd::run(self.path, Carve { band: self, sweep, rows: [j0, j1] }));
+    }
+}
+
+/// Takes what a sweep leaves out of some rows of a band.
+struct Carve<'a, 'b> {
+    band: &'a mut Band<'b>,
+    sweep: &'a Sweep<'a>,
+    rows: [usize; 2],
+}
+
+impl Kernel for Carve<'_, '_> {
+    type Out = Contact;
+
+    #[inline(always)]
+    fn run(self) -> Contact {
+        let Band { lattice, row0, z, batch, .. } = self.band;
+        let mut cut = Cut { nx: lattice.grid.nx, row0: *row0, z, met: Met::default() };
+        for_nodes(lattice, batch, self.sweep, self.rows, &mut cut);
+        cut.met.contact(self.sweep)
+    }
+}
+
+/// Lowers nodes and notes what that meets.
+struct Cut<'a> {
+    nx: usize,
+    row0: usize,
+    z: &'a mut [f32],
+    met: Met,
+}
+
+impl Sink for Cut<'_> {
+    #[inline(always)]
+    fn take<const N: usize>(&mut self, shape: &impl Shape<N>, batch: &mut Batch) {
+        let n = batch.len.min(BATCH);
+        let mut any = false;
+        for k in 0..n {
+            let at = (batch.line[k] as usize - self.row0) * self.nx + batch.column[k] as usize;
+            let node = &mut self.z[at];
+            let (old, new) = (*node, batch.z[k] as f32);
+            batch.old[k] = old;
+            any |= new < old;
+            *node = if new < old { new } else { old };
+        }
+        if any {
+            // Places without a node meet nothing.
+            batch.old[n..].fill(f32::NEG_INFINITY);
+            self.met.add(shape, batch);
+        }
+    }
+}
+
+/// The largest of what the nodes lowered so far met, lane by lane.
+struct Met {
+    deepest: [f32; LANES],
+    engaged: [f64; LANES],
+    ahead: [f64; LANES],
+}
+
+impl Default for Met {
+    #[inline(always)]
+    fn default() -> Self {
+        Self { deepest: [0.0; LANES], engaged: [0.0; LANES], ahead: [f64::NEG_INFINITY; LANES] }
+    }
+}
+
+impl Met {
+    #[inline(always)]
+    fn add<const N: usize, S: Shape<N>>(&mut self, shape: &S, batch: &Batch) {
+        let groups = batch.len.div_ceil(LANES);
+        let old = &batch.old.as_chunks::<LANES>().0[..groups];
+        let z = &batch.z.as_chunks::<LANES>().0[..groups];
+        let tip = &batch.tip.as_chunks::<LANES>().0[..groups];
+        let beside = &batch.beside.as_chunks::<LANES>().0[..groups];
+        for g in 0..groups {
+            for k in 0..LANES {
+                // A node that is not lowered has nothing removed, and so passes none of the limits.
+                let wood = f64::from(old[g][k]);
+                let fall = old[g][k] - z[g][k] as f32;
+                let (removed_mm, high_mm) = (wood - z[g][k], wood - tip[g][k]);
+                self.deepest[k] = if fall > self.deepest[k] { fall } else { self.deepest[k] };
                 let here = if removed_mm > ENGAGED_FROM_MM { high_mm } else { 0.0 };
-                engaged = high(engaged, here);
-                if removed_mm > CHIP_FROM_MM {
-                    ahead = high(ahead, sweep.ahead(high_mm, left.beside));
-                }
+                self.engaged[k] = high(self.engaged[k], here);
+                let counts = removed_mm > CHIP_FROM_MM;
+                let ahead = if S::AHEAD_IS_CHEAP || counts {
+                    shape.ahead(high_mm, beside[g][k])
+                } else {
+                    f64::NEG_INFINITY
+                };
+                self.ahead[k] = high(if counts { ahead } else { f64::NEG_INFINITY }, self.ahead[k]);
             }
-        });
+        }
+    }
+
+    #[inline(always)]
+    fn contact(mut self, sweep: &Sweep) -> Contact {
+        let mut half = LANES / 2;
+        while half > 0 {
+            for k in 0..half {
+                let (a, b) = (self.deepest[k], self.deepest[k + half]);
+                self.deepest[k] = if a > b { a } else { b };
+                self.engaged[k] = high(self.engaged[k], self.engaged[k + half]);
+                self.ahead[k] = high(self.ahead[k], self.ahead[k + half]);
+            }
+            half /= 2;
+        }
+        let ahead = self.ahead[0];
         let chip = if ahead > 0.0 { sweep.chip(ahead) as f32 } else { 0.0 };
-        *contact = contact.worst(Contact { deepest_mm: deepest, engaged_mm: engaged as f32, chip });
+        Contact { deepest_mm: self.deepest[0], engaged_mm: self.engaged[0] as f32, chip }
     }
 }
 

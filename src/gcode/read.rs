@@ -104,11 +104,29 @@ const TYPICAL_LINE: usize = 16;
 /// # Errors
 /// [`ReadError`] for the first thing that is not in the dialect.
 pub fn read(text: &str, machine: &Machine, start: DVec3) -> Result<Program, ReadError> {
+    read_lines(text, machine, start, true)
+}
+
+/// [`read`], with or without the shorter way for plain lines.
+fn read_lines(
+    text: &str,
+    machine: &Machine,
+    start: DVec3,
+    shorter: bool,
+) -> Result<Program, ReadError> {
     let mut reader = Reader::new(Dialect::Grbl, machine, start);
     let mut rest = text.as_bytes();
     reader.program.moves.reserve((rest.len() / TYPICAL_LINE).min(MAX_MOVES));
     while !rest.is_empty() {
         reader.number += 1;
+        if shorter
+            && reader.goes_straight()
+            && let Some((axes, used)) = words::axes_line(rest)
+        {
+            reader.travel(reader.target(axes), axes)?;
+            rest = &rest[used..];
+            continue;
+        }
         reader.text = rest;
         let used = words::next_line(rest, &mut reader.line)
             .map_err(|(column, fault)| reader.error(column, fault))?;

@@ -5,6 +5,7 @@
 //! ([`Turned::touch_along`]). The height left is convex in the tip's place, so the nearer end of the move serves nodes
 //! whose best place lies beyond it.
 
+use super::lattice::{Lattice, Piece, Shape};
 use super::sweep::{Left, SPAN_SLACK_MM, Span, VERTICAL_MM, disc_row, high, low};
 use crate::cutter::Turned;
 use crate::geom::{DVec2, DVec3, Move};
@@ -14,6 +15,9 @@ const PARALLEL: f64 = 1e-12;
 
 /// Steps of a [`Reach`] in the slope and in the distance from the axis.
 const STEPS: usize = 64;
+
+/// Most slices of the distance from the way, on either side of it.
+const MOST_SLICES: f64 = 256.0;
 
 /// Round-off allowance for squares of radii, as a part of the cutter's own.
 const SQUARE_SLACK: f64 = 1e-9;
@@ -149,20 +153,14 @@ impl<'a> Drawn<'a> {
         }
     }
 
-    /// The point that spans and offsets count from.
-    pub(super) fn anchor(&self) -> DVec3 {
-        self.low
-    }
-
     /// Lowest and highest y it can touch.
     pub(super) fn y_range(&self) -> (f64, f64) {
         let (r, far) = (self.form.radius_mm() + SPAN_SLACK_MM, self.u.y * self.len);
         (self.low.y + far.min(0.0) - r, self.low.y + far.max(0.0) + r)
     }
 
-    /// The spans of x to look at on the row `dy` above the anchor.
-    #[inline]
-    pub(super) fn spans(&self, dy: f64, pitch_mm: f64) -> [Span; 2] {
+    /// As [`Shape::spans`].
+    fn row_spans(&self, dy: f64, pitch_mm: f64) -> [Span; 2] {
         let all = self.stadium(dy);
         let Some(reach) = self.reach else { return [all, Span::EMPTY] };
         if self.u.y.abs() < PARALLEL {
@@ -240,22 +238,12 @@ impl<'a> Drawn<'a> {
             return ends;
         }
         // Between the ends: |q| <= r and 0 <= s <= len.
-        let within = |at: f64, per_x: f64, lo: f64, hi: f64| {
-            if per_x.abs() > PARALLEL {
-                let (a, b) = ((lo - at) / per_x, (hi - at) / per_x);
-                Span::new(a.min(b), a.max(b))
-            } else if (lo..=hi).contains(&at) {
-                Span::new(f64::NEG_INFINITY, f64::INFINITY)
-            } else {
-                Span::EMPTY
-            }
-        };
         let strip = within(self.u.x * dy, -self.u.y, -r, r);
         ends.hull(strip.meet(within(self.u.y * dy, self.u.x, 0.0, self.len)))
     }
 
     /// The forward part of the normal of the cutter's surface at `height_mm` above the tip, `beside_mm` off its way.
-    pub(super) fn chip(&self, height_mm: f64, beside_mm: f64) -> f64 {
+    fn chip(&self, height_mm: f64, beside_mm: f64) -> f64 {
         let rim = self.form.radius_mm();
         let reach = self.form.radius_at(height_mm).min(rim);
         if self.len == 0.0 || reach <= beside_mm.abs() {
@@ -266,9 +254,120 @@ impl<'a> Drawn<'a> {
         steep * (reach * reach - beside_mm * beside_mm).sqrt() / reach
     }
 
-    /// What it leaves at the node `d` from the anchor; nothing where the move before it came as low.
+    /// Where a line of the move's slope touches the section at a distance from the axis.
+    #[inline]
+    fn touch(&self, aside: f64) -> f64 {
+        match self.reach {
+            Some(reach) => {
+                let slack = 4.0 * SPAN_SLACK_MM;
+                let [least, most] = reach.touch(self.m, [aside, aside]);
+                self.form.touch_along_between(aside, self.m, [least - slack, most + slack])
+            }
+            None => self.form.touch_along(aside, self.m),
+        }
+    }
+
+    /// From where to where along the way it serves nodes whose distance from the way lies between two, neither of them
+    /// negative.
+    #[inline]
+    fn served(&self, reach: &Reach, [near, far]: [f64; 2]) -> [f64; 2] {
+        let r = self.form.radius_mm();
+        let touch = |limit: Limit| {
+            let shift = limit.shift_mm + SPAN_SLACK_MM;
+            let [near, far] = [high(near - shift, 0.0), low(far + shift, r)];
+            let [least, most] = reach.touch(limit.slope, [low(near, r), far]);
+            [least - shift, most + shift]
+        };
+        let [least, most] = self.limits;
+        [
+            least.map_or(-r, |limit| touch(limit)[0]),
+            self.len + most.map_or(r, |limit| touch(limit)[1]),
+        ]
+    }
+
+    /// The pieces of rows in a rectangle along the way, `s` long and `q` across.
+    #[inline]
+    fn rectangle(
+        &self,
+        lattice: &Lattice,
+        [j0, j1]: [usize; 2],
+        [s, q]: [[f64; 2]; 2],
+        pieces: &mut Vec<Piece>,
+    ) {
+        if s[0] > s[1] {
+            return;
+        }
+        let (u, grid) = (self.u, &lattice.grid);
+        let q = [q[0] - SPAN_SLACK_MM, q[1] + SPAN_SLACK_MM];
+        let (up, side) = (s.map(|s| s * u.y), q.map(|q| q * u.x));
+        let lo = low(up[0], up[1]) + low(side[0], side[1]) - SPAN_SLACK_MM;
+        let hi = high(up[0], up[1]) + high(side[0], side[1]) + SPAN_SLACK_MM;
+        let Some((j0, j1)) = lattice.rows(self.low.y + lo, self.low.y + hi, j0, j1 + 1) else {
+            return;
+        };
+        let x0 = grid.origin.x - self.low.x;
+        for j in j0..=j1 {
+            let dy = grid.origin.y + j as f64 * grid.pitch_mm - self.low.y;
+            let along = within(u.y * dy, u.x, s[0], s[1]);
+            let span = along.meet(within(u.x * dy, -u.y, q[0], q[1]));
+            let [first, last] = lattice.nodes_in(span, x0);
+            if first <= last {
+                pieces.push([j as i32, first, last]);
+            }
+        }
+    }
+}
+
+/// The x where `at + per_x x` lies between two values.
+#[inline]
+fn within(at: f64, per_x: f64, lo: f64, hi: f64) -> Span {
+    if per_x.abs() > PARALLEL {
+        let (a, b) = ((lo - at) / per_x, (hi - at) / per_x);
+        Span::new(low(a, b), high(a, b))
+    } else if (lo..=hi).contains(&at) {
+        Span::new(f64::NEG_INFINITY, f64::INFINITY)
+    } else {
+        Span::EMPTY
+    }
+}
+
+impl Shape<2> for Drawn<'_> {
+    const AHEAD_IS_CHEAP: bool = false;
+
     #[inline(always)]
-    pub(super) fn left(&self, d: DVec2) -> Left {
+    fn anchor(&self) -> DVec3 {
+        self.low
+    }
+
+    #[inline(always)]
+    fn spans(&self, dy: f64, pitch_mm: f64) -> [Span; 2] {
+        self.row_spans(dy, pitch_mm)
+    }
+
+    /// A short move of a chain serves a narrow crescent, and how far that lies from its way's middle depends on the
+    /// distance from the way alone: so slices of that distance, each with its own bounds.
+    #[inline(always)]
+    fn pieces(&self, lattice: &Lattice, rows: [usize; 2], pieces: &mut Vec<Piece>) -> bool {
+        let Some(reach) = self.reach else { return false };
+        let r = self.form.radius_mm();
+        // Along X the rows are such slices already.
+        if self.len > r || self.u.y.abs() < PARALLEL {
+            return false;
+        }
+        let slices = ((r / lattice.grid.pitch_mm).ceil()).clamp(1.0, MOST_SLICES);
+        let step = r / slices;
+        for k in 0..slices as u32 {
+            let (near, far) = (f64::from(k) * step, f64::from(k + 1) * step);
+            let along = self.served(reach, [near, far]);
+            self.rectangle(lattice, rows, [along, [near, far]], pieces);
+            self.rectangle(lattice, rows, [along, [-far, -near]], pieces);
+        }
+        true
+    }
+
+    /// Nothing where the move before it came as low.
+    #[inline(always)]
+    fn left(&self, d: DVec2) -> Left {
         let nothing = Left { z: f64::INFINITY, tip: self.low.z, beside: 0.0 };
         let r = self.form.radius_mm();
         let (s, q) = (self.u.dot(d), self.u.perp_dot(d));
@@ -280,7 +379,7 @@ impl<'a> Drawn<'a> {
         if q.abs() > r {
             return nothing;
         }
-        let best = s - self.form.touch_along(q.abs(), self.m);
+        let best = s - self.touch(q.abs());
         if (self.served[0] && best < -SPAN_SLACK_MM)
             || (self.served[1] && best > self.len + SPAN_SLACK_MM)
         {
@@ -295,5 +394,10 @@ impl<'a> Drawn<'a> {
         }
         let tip = self.low.z + self.m * at;
         Left { z: tip + self.form.height(off2.sqrt()), tip, beside: q }
+    }
+
+    #[inline(always)]
+    fn ahead(&self, height_mm: f64, beside_mm: f64) -> f64 {
+        self.chip(height_mm, beside_mm)
     }
 }

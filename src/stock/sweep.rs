@@ -19,6 +19,7 @@
 //! Culling may always keep a node too many: every height computed here is one that the move really cuts.
 
 use super::drawn::Drawn;
+use super::lattice::Shape;
 use crate::cutter::Profile;
 use crate::geom::{DVec2, DVec3, Move};
 
@@ -231,15 +232,86 @@ pub(super) struct Bound {
     c: f64,
 }
 
-impl Bound {
-    /// The spans between two of them on the row `dy` above the anchor, for a direction along X or any other.
+/// The inner part of a chain along X, between two curves.
+pub(super) struct Level<'a>(pub(super) &'a Along, pub(super) [Bound; 2]);
+
+/// The inner part of a chain in any other direction.
+pub(super) struct Tilted<'a>(pub(super) &'a Along, pub(super) [Bound; 2]);
+
+/// A move with a free end.
+pub(super) struct Free<'a>(pub(super) &'a Along);
+
+impl Shape<1> for Level<'_> {
     #[inline(always)]
-    pub(super) fn between<const LEVEL: bool>([lo, hi]: &[Self; 2], dy: f64) -> [Span; 2] {
-        if LEVEL {
-            hi.behind.level_row(hi.c, dy).without(lo.behind.level_row(lo.c, dy))
-        } else {
-            hi.behind.tilted_row(hi.c, dy).without(lo.behind.tilted_row(lo.c, dy))
-        }
+    fn anchor(&self) -> DVec3 {
+        self.0.low
+    }
+
+    #[inline(always)]
+    fn spans(&self, dy: f64, _: f64) -> [Span; 1] {
+        let Behind { u, r, .. } = self.0.dir;
+        let across = u.x * dy;
+        let w2 = r * r - across * across;
+        let w = high(w2, 0.0).sqrt();
+        let [lo, hi] = self.1.map(|bound| bound.c + bound.behind.mp * w);
+        let forward = u.x > 0.0;
+        let span = Span::new(if forward { lo } else { -hi }, if forward { hi } else { -lo });
+        [span.only_if(w2 >= 0.0)]
+    }
+
+    #[inline(always)]
+    fn left(&self, d: DVec2) -> Left {
+        self.0.left(d)
+    }
+
+    #[inline(always)]
+    fn ahead(&self, height_mm: f64, beside_mm: f64) -> f64 {
+        self.0.ahead(height_mm, beside_mm)
+    }
+}
+
+impl Shape<2> for Tilted<'_> {
+    #[inline(always)]
+    fn anchor(&self) -> DVec3 {
+        self.0.low
+    }
+
+    #[inline(always)]
+    fn spans(&self, dy: f64, _: f64) -> [Span; 2] {
+        let [lo, hi] = &self.1;
+        hi.behind.tilted_row(hi.c, dy).without(lo.behind.tilted_row(lo.c, dy))
+    }
+
+    #[inline(always)]
+    fn left(&self, d: DVec2) -> Left {
+        self.0.left(d)
+    }
+
+    #[inline(always)]
+    fn ahead(&self, height_mm: f64, beside_mm: f64) -> f64 {
+        self.0.ahead(height_mm, beside_mm)
+    }
+}
+
+impl Shape<2> for Free<'_> {
+    #[inline(always)]
+    fn anchor(&self) -> DVec3 {
+        self.0.low
+    }
+
+    #[inline(always)]
+    fn spans(&self, dy: f64, _: f64) -> [Span; 2] {
+        self.0.spans(dy)
+    }
+
+    #[inline(always)]
+    fn left(&self, d: DVec2) -> Left {
+        self.0.left(d)
+    }
+
+    #[inline(always)]
+    fn ahead(&self, height_mm: f64, beside_mm: f64) -> f64 {
+        self.0.ahead(height_mm, beside_mm)
     }
 }
 
@@ -354,23 +426,8 @@ impl Sweep<'_> {
         Some(Self::Stamp(Stamp { at: a.to, tip, wedge }))
     }
 
-    /// A measure that grows with the chip of a node where wood stands `height_mm` above the tip, `beside_mm` off its way: of
-    /// the largest one [`Sweep::chip`] is taken. None where the cutter stands (its neighbours in a chain tell).
-    #[inline(always)]
-    pub(super) fn ahead(&self, height_mm: f64, beside_mm: f64) -> f64 {
-        match self {
-            Self::Stamp(_) => 0.0,
-            Self::Along(a) => {
-                let r = a.tip.radius;
-                let h = low(high(height_mm, 0.0), r);
-                let reach2 = if a.tip.flat { r * r } else { h * (2.0 * r - h) };
-                reach2 - beside_mm * beside_mm
-            }
-            Self::Turned(t) => t.chip(height_mm, beside_mm),
-        }
-    }
-
-    /// The forward part of the normal of the cutter's surface for the largest of [`Sweep::ahead`].
+    /// The forward part of the normal of the cutter's surface for the largest of [`Shape::ahead`]. None where
+    /// the cutter stands (its neighbours in a chain tell).
     pub(super) fn chip(&self, ahead: f64) -> f64 {
         match self {
             Self::Stamp(_) => 0.0,
@@ -399,15 +456,14 @@ impl Sweep<'_> {
     }
 }
 
-impl Stamp {
-    /// The point that spans and offsets count from.
-    pub(super) fn anchor(&self) -> DVec3 {
+impl Shape<4> for Stamp {
+    #[inline(always)]
+    fn anchor(&self) -> DVec3 {
         self.at
     }
 
-    /// The spans of x to look at on the row `dy` above the anchor.
     #[inline(always)]
-    pub(super) fn spans(&self, dy: f64) -> [Span; 4] {
+    fn spans(&self, dy: f64, _: f64) -> [Span; 4] {
         let mut out = [disc_row(self.tip.radius, dy), Span::EMPTY, Span::EMPTY, Span::EMPTY];
         for (behind, inside) in self.wedge.iter().flatten() {
             let row = behind.row(0.0, dy);
@@ -422,25 +478,24 @@ impl Stamp {
         out
     }
 
-    /// What it leaves at the node `d` from the anchor.
     #[inline(always)]
-    pub(super) fn left(&self, d: DVec2) -> Left {
+    fn left(&self, d: DVec2) -> Left {
         let h2 = self.tip.radius * self.tip.radius - d.length_squared();
         let up = if self.tip.flat { 0.0 } else { self.tip.radius - high(h2, 0.0).sqrt() };
         let z = if h2 >= 0.0 { self.at.z + up } else { f64::INFINITY };
         Left { z, tip: self.at.z, beside: 0.0 }
     }
+
+    #[inline(always)]
+    fn ahead(&self, _: f64, _: f64) -> f64 {
+        0.0
+    }
 }
 
 impl Along {
-    /// The point that spans and offsets count from.
-    pub(super) fn anchor(&self) -> DVec3 {
-        self.low
-    }
-
     /// The spans of x to look at on the row `dy` above the anchor.
     #[inline(always)]
-    pub(super) fn spans(&self, dy: f64) -> [Span; 2] {
+    fn spans(&self, dy: f64) -> [Span; 2] {
         let stadium = self.stadium_row(dy);
         let [lo, hi] = self.ends;
         let base = hi.map_or(stadium, |hi| stadium.meet(hi.behind.row(hi.c, dy)));
@@ -481,7 +536,7 @@ impl Along {
 
     /// What it leaves at the node `d` from the anchor.
     #[inline(always)]
-    pub(super) fn left(&self, d: DVec2) -> Left {
+    fn left(&self, d: DVec2) -> Left {
         let u = self.dir.u;
         let r = self.tip.radius;
         let s = u.x * d.x + u.y * d.y;
@@ -495,5 +550,14 @@ impl Along {
         // The free optimum of a flat cutter lies on the rim itself; round-off must not lose it.
         let comes = w2 >= 0.0 && (h2 >= 0.0 || at == best);
         Left { z: if comes { tip + up } else { f64::INFINITY }, tip, beside: q }
+    }
+
+    /// As [`Shape::ahead`].
+    #[inline(always)]
+    fn ahead(&self, height_mm: f64, beside_mm: f64) -> f64 {
+        let r = self.tip.radius;
+        let h = low(high(height_mm, 0.0), r);
+        let reach2 = if self.tip.flat { r * r } else { h * (2.0 * r - h) };
+        reach2 - beside_mm * beside_mm
     }
 }

@@ -289,6 +289,13 @@ impl Reader<'_> {
         Ok(())
     }
 
+    /// True where a line of axis words alone is a straight motion that nothing forbids.
+    #[inline]
+    pub(super) fn goes_straight(&self) -> bool {
+        let has_speed = self.motion == Motion::Rapid || self.feed != Feed::Unset;
+        !self.ended && has_speed && !matches!(self.motion, Motion::Arc(_))
+    }
+
     /// Where the axis words lead.
     #[inline]
     pub(super) fn target(&self, axes: [Option<f64>; 3]) -> DVec3 {

@@ -180,3 +180,43 @@ proptest! {
         let _ = read(&text, &machine(), START);
     }
 }
+
+proptest::proptest! {
+    /// The shorter way for plain lines gives what the way for all lines gives, errors included.
+    #[test]
+    fn the_shorter_way_reads_the_same(
+        lines in proptest::collection::vec((0usize..28, -99_999i64..99_999, 0usize..4), 1..40),
+    ) {
+        let mut text = String::from("G21 G90\n");
+        for (k, number, decimals) in lines {
+            let v = format!("{:.decimals$}", number as f64 / 1000.0);
+            text += &match k {
+                0 => format!("G1 X{v} F600\n"),
+                1 => format!("X{v} X1\n"),
+                2 => format!("Z{v} X{v}\n"),
+                3 => format!("x{v} y1\r\n"),
+                4 => "G91\n".into(),
+                5 => "M2\n".into(),
+                6 => format!("X{v} (so) Y.5\n"),
+                7 => "X\n".into(),
+                8 => "X1.2.3\n".into(),
+                9 => "G2 X1 Y1 I1 J0\n".into(),
+                10 => "X1234567890123456\n".into(),
+                11 => format!("X{v}{}Y2\n", " ".repeat(75)),
+                12 => "Y-.5 Z5.\n".into(),
+                13 => "G1 F900\nG20\n".into(),
+                14 => "X- 5\n".into(),
+                15 => "X+5 Y-0\n".into(),
+                16 => "G0\n".into(),
+                17 => "\n".into(),
+                _ => format!("X{v} Y{number} Z-{decimals}.25\n"),
+            };
+        }
+        let machine = machine();
+        for text in [text.as_str(), text.trim_end()] {
+            let [short, long] = [true, false]
+                .map(|way| format!("{:?}", read_lines(text, &machine, DVec3::new(1.0, 2.0, 3.0), way)));
+            proptest::prop_assert_eq!(short, long);
+        }
+    }
+}

@@ -255,6 +255,59 @@ pub(super) fn next_line(text: &[u8], line: &mut Line) -> Result<usize, (u32, Fau
     Ok(at + usize::from(text[at..].starts_with(b"\r\n")) + usize::from(at < text.len()))
 }
 
+/// The axis words of the first line of `text`, and the length of that and its end, where it is as programs have them by the
+/// million: X, Y and Z, capitals, once each in this order. `None` for any other line, which [`next_line`] reads: it
+/// gives the same for these.
+#[inline]
+pub(super) fn axes_line(text: &[u8]) -> Option<([Option<f64>; 3], usize)> {
+    let mut axes = [None; 3];
+    let (mut at, mut free) = (0, 0);
+    loop {
+        match *text.get(at)? {
+            b'\n' if free > 0 && at <= MAX_LINE => return Some((axes, at + 1)),
+            b' ' => at += 1,
+            c @ b'X'..=b'Z' => {
+                let axis = usize::from(c - b'X');
+                if axis < free {
+                    return None;
+                }
+                let (value, next) = plain_number(text, at + 1)?;
+                axes[axis] = Some(value);
+                free = axis + 1;
+                at = next;
+            }
+            _ => return None,
+        }
+    }
+}
+
+/// As [`number`], of a number without blanks and plus.
+#[inline]
+fn plain_number(text: &[u8], from: usize) -> Option<(f64, usize)> {
+    let negative = *text.get(from)? == b'-';
+    let begin = from + usize::from(negative);
+    let (mut at, mut point, mut mantissa) = (begin, None, 0_u64);
+    loop {
+        let c = *text.get(at)?;
+        let digit = c.wrapping_sub(b'0');
+        if digit < 10 {
+            mantissa = mantissa.wrapping_mul(10).wrapping_add(u64::from(digit));
+        } else if c == b'.' && point.is_none() {
+            point = Some(at + 1);
+        } else {
+            break;
+        }
+        at += 1;
+    }
+    let decimals = point.map_or(0, |point| at - point);
+    let count = at - begin - usize::from(point.is_some());
+    if count == 0 || count > MAX_DIGITS {
+        return None;
+    }
+    let value = mantissa as i64 as f64 / POW10[decimals];
+    Some((if negative { -value } else { value }, at))
+}
+
 /// The end of the comment that starts at `at`.
 fn comment(text: &[u8], at: usize, close: Option<u8>) -> Result<usize, (u32, Fault)> {
     let mut i = at + 1;
