@@ -12,8 +12,10 @@ use std::fmt::Write;
 use std::time::Instant;
 
 fn main() {
-    println!("| lines | read ms | time ms | with a serial line ms | program takes s |");
-    println!("|---|---|---|---|---|");
+    println!(
+        "| lines | read ms | M lines/s | as from elsewhere M lines/s | time ms | with a serial line ms | program takes s |"
+    );
+    println!("|---|---|---|---|---|---|---|");
     for lines in [10_000, 100_000, 500_000] {
         row(lines);
     }
@@ -38,6 +40,11 @@ fn row(lines: u32) {
     let begun = Instant::now();
     let program = read::read(&text, machine, DVec3::ZERO).expect("a program of the dialect");
     let read_ms = begun.elapsed().as_secs_f64() * 1e3;
+    let begun = Instant::now();
+    let frame = read::Frame::new(DVec3::ZERO);
+    read::read_any(text.as_bytes(), machine, &frame).expect("a program of the dialect");
+    let any_ms = begun.elapsed().as_secs_f64() * 1e3;
+    let rate = |ms: f64| f64::from(program.lines) / ms / 1e3;
     let timed = |mut planner: Planner, bytes: &[usize]| {
         let begun = Instant::now();
         run_time(&program, bytes, &mut planner);
@@ -46,5 +53,9 @@ fn row(lines: u32) {
     let bytes: Vec<usize> = text.lines().map(|line| line.len() + 1).collect();
     let (free_ms, seconds) = timed(Planner::new(machine), &[]);
     let (wire_ms, _) = timed(Planner::with_baud(machine, 115_200.0), &bytes);
-    println!("| {lines} | {read_ms:.0} | {free_ms:.0} | {wire_ms:.0} | {seconds:.0} |");
+    println!(
+        "| {lines} | {read_ms:.0} | {:.1} | {:.1} | {free_ms:.0} | {wire_ms:.0} | {seconds:.0} |",
+        rate(read_ms),
+        rate(any_ms)
+    );
 }

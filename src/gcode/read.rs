@@ -120,8 +120,8 @@ fn read_lines(
     while !rest.is_empty() {
         reader.number += 1;
         if shorter
-            && reader.goes_straight()
-            && let Some((axes, used)) = words::axes_line(rest)
+            && let Some((motion, axes, used)) = words::plain_line(rest)
+            && reader.goes_straight(motion)
         {
             reader.travel(reader.target(axes), axes)?;
             rest = &rest[used..];

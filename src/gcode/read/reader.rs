@@ -289,11 +289,17 @@ impl Reader<'_> {
         Ok(())
     }
 
-    /// True where a line of axis words alone is a straight motion that nothing forbids.
+    /// True where a line of a motion word, if any, and axis words is a straight motion that nothing forbids; notes the
+    /// motion then.
     #[inline]
-    pub(super) fn goes_straight(&self) -> bool {
-        let has_speed = self.motion == Motion::Rapid || self.feed != Feed::Unset;
-        !self.ended && has_speed && !matches!(self.motion, Motion::Arc(_))
+    pub(super) fn goes_straight(&mut self, word: Option<Motion>) -> bool {
+        let motion = word.unwrap_or(self.motion);
+        let has_speed = motion == Motion::Rapid || self.feed != Feed::Unset;
+        if self.ended || !has_speed || matches!(motion, Motion::Arc(_)) {
+            return false;
+        }
+        self.motion = motion;
+        true
     }
 
     /// Where the axis words lead.

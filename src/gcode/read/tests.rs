@@ -185,7 +185,7 @@ proptest::proptest! {
     /// The shorter way for plain lines gives what the way for all lines gives, errors included.
     #[test]
     fn the_shorter_way_reads_the_same(
-        lines in proptest::collection::vec((0usize..28, -99_999i64..99_999, 0usize..4), 1..40),
+        lines in proptest::collection::vec((0usize..34, -99_999i64..99_999, 0usize..4), 1..40),
     ) {
         let mut text = String::from("G21 G90\n");
         for (k, number, decimals) in lines {
@@ -209,6 +209,10 @@ proptest::proptest! {
                 15 => "X+5 Y-0\n".into(),
                 16 => "G0\n".into(),
                 17 => "\n".into(),
+                18 => format!("G1X{v} Z1\n"),
+                19 => format!("G01 X{v}\n"),
+                20 => format!("G1 {v} X1\n"),
+                21 => format!("G0 Y{v}\n"),
                 _ => format!("X{v} Y{number} Z-{decimals}.25\n"),
             };
         }

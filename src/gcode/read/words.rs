@@ -255,16 +255,22 @@ pub(super) fn next_line(text: &[u8], line: &mut Line) -> Result<usize, (u32, Fau
     Ok(at + usize::from(text[at..].starts_with(b"\r\n")) + usize::from(at < text.len()))
 }
 
-/// The axis words of the first line of `text`, and the length of that and its end, where it is as programs have them by the
-/// million: X, Y and Z, capitals, once each in this order. `None` for any other line, which [`next_line`] reads: it
-/// gives the same for these.
+/// Motion and axis words of a line, and its length with its end.
+type PlainLine = (Option<Motion>, [Option<f64>; 3], usize);
+
+/// The first line of `text` where it is as programs have them by the million: G0, G1 or neither, then X, Y and Z, capitals,
+/// at most once each in this order. `None` for any other line, which [`next_line`] reads: it gives the same for these.
 #[inline]
-pub(super) fn axes_line(text: &[u8]) -> Option<([Option<f64>; 3], usize)> {
-    let mut axes = [None; 3];
-    let (mut at, mut free) = (0, 0);
+pub(super) fn plain_line(text: &[u8]) -> Option<PlainLine> {
+    let (motion, mut at) = match text {
+        [b'G', b'0', ..] => (Some(Motion::Rapid), 2),
+        [b'G', b'1', ..] => (Some(Motion::Straight), 2),
+        _ => (None, 0),
+    };
+    let (mut axes, mut free) = ([None; 3], 0);
     loop {
         match *text.get(at)? {
-            b'\n' if free > 0 && at <= MAX_LINE => return Some((axes, at + 1)),
+            b'\n' if free > 0 && at <= MAX_LINE => return Some((motion, axes, at + 1)),
             b' ' => at += 1,
             c @ b'X'..=b'Z' => {
                 let axis = usize::from(c - b'X');
