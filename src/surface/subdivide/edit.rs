@@ -270,7 +270,9 @@ fn add_conditions(
             if !rows.iter().all(|(row, by)| by.is_finite() && row.iter().all(|r| known(r.0))) {
                 return Err(EditError::Number { edit });
             }
-            rows.iter().for_each(|(row, by)| place(row, *by));
+            for (row, by) in rows {
+                place(row, *by);
+            }
         }
         Edit::Point { at, by, normal } => {
             let sample = sample(surface, edit, at)?;
@@ -324,7 +326,9 @@ fn free(
     for _ in 0..rules.rings.unwrap_or(0) {
         let before = reached.clone();
         for face in mesh.faces().filter(|face| face.iter().any(|&v| before[v as usize])) {
-            face.iter().for_each(|&v| reached[v as usize] = true);
+            for &v in face {
+                reached[v as usize] = true;
+            }
         }
     }
     // Vertices without faces take no part.

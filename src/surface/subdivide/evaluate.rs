@@ -114,6 +114,9 @@ pub(super) fn basis(t: f64) -> [[f64; 4]; 2] {
     ]
 }
 
+/// What receives the patches of a face: the control vertices that count, its net over them, and its depth.
+type Visit<'a> = &'a mut dyn FnMut(&[u32], &[Vec<f64>], u32);
+
 /// The limit surface over a control mesh, with boundary, creases and corners.
 #[derive(Debug, Clone)]
 pub struct LimitSurface {
@@ -280,7 +283,7 @@ impl LimitSurface {
         &self,
         face: usize,
         deepest: u32,
-        visit: &mut dyn FnMut(&[u32], &[Vec<f64>], u32),
+        visit: Visit<'_>,
     ) -> Result<(), SubdivideError> {
         let (local, vertices) = Local::of(&self.control, &self.round(face));
         let mut stack = vec![(local, 0)];

@@ -143,7 +143,9 @@ pub(super) fn assemble(
     // A vertex moves the faces that share a vertex with one of its own.
     let mut near = vec![false; mesh.vertices.len()];
     for face in mesh.faces().filter(|face| face.iter().any(|&v| index[v as usize].is_some())) {
-        face.iter().for_each(|&v| near[v as usize] = true);
+        for &v in face {
+            near[v as usize] = true;
+        }
     }
     let mut out = Lower::new(count);
     let mut add = |ids: &[u32], value: &dyn Fn(usize, usize) -> f64| {

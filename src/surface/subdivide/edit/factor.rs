@@ -259,7 +259,9 @@ fn triangulate(square: &mut [f64], diagonal: &[f64], height: usize) -> bool {
                 return false;
             }
             let root = pivot.sqrt();
-            column.iter_mut().for_each(|c| *c /= root);
+            for c in column.iter_mut() {
+                *c /= root;
+            }
         }
         let (block, rest) = square.split_at_mut(last * height);
         let block = &block[first * height..];

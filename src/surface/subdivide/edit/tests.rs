@@ -241,3 +241,56 @@ fn factors_solve_and_places_are_found() {
     }
     assert_eq!(surface.locate(DVec2::new(-5.0, 3.0)).unwrap(), None);
 }
+
+/// The matrix of the grid's energy over its inner vertices: what an edit costs, and that nothing costs less. The force of
+/// the plate is a multiple of the condition's row at the minimum, and the least change lies in that row as well.
+#[test]
+fn edits_cost_what_is_tabled_and_nothing_costs_less() {
+    let grid = grid();
+    let topology = Topology::of(grid.mesh()).unwrap();
+    let at = spot(3, 3, 0.0, 0.0);
+    let row = grid.at(at.face, 0.0, 0.0).unwrap();
+    let part = |v: usize| {
+        row.vertices.iter().zip(&row.point).filter(|r| *r.0 as usize == v).map(|r| r.1).sum()
+    };
+    let row: Vec<f64> = (0..49).map(part).collect();
+    let index: Vec<Option<u32>> = (0..49).map(Some).collect();
+    let matrix = energy::assemble(&grid, &topology, &index, 49).unwrap();
+    let value = |i: usize, j: usize| {
+        let (low, high) = (i.min(j) as u32, i.max(j));
+        matrix.rows[high].iter().find(|e| e.0 == low).map_or(0.0, |e| e.1)
+    };
+    let x: Vec<f64> =
+        edit(&grid, &[raise(at, 1.0)], &PLATE).unwrap().moved.iter().map(|d| d.z).collect();
+    let force: Vec<f64> = (0..49).map(|i| (0..49).map(|j| value(i, j) * x[j]).sum()).collect();
+    near(x.iter().zip(&force).map(|(x, f)| x * f).sum(), 2.409962757);
+    let inner = |v: &usize| !topology.is_boundary(*v as u32);
+    let factor = force[24] / row[24];
+    assert!((0..49).filter(inner).all(|v| (force[v] - factor * row[v]).abs() < 1e-9));
+    let least = edit(&grid, &[raise(at, 1.0)], &LEAST).unwrap();
+    let factor = least.moved[24].z / row[24];
+    assert!((0..49).all(|v| (least.moved[v].z - factor * row[v]).abs() < 1e-12));
+    // The row of an inner vertex, by its offset; those whose faces are all regular.
+    let mut wide = PolyMesh::with_vertices(vec![DVec3::ZERO; 121]);
+    (0..109).filter(|k| k % 11 < 10).for_each(|k| wide.add_face(&[k, k + 1, k + 12, k + 11]));
+    let wide = LimitSurface::of(&wide, |_, _| false).unwrap();
+    let topology = Topology::of(wide.mesh()).unwrap();
+    let index: Vec<Option<u32>> = (0..121).map(Some).collect();
+    let matrix = energy::assemble(&wide, &topology, &index, 121).unwrap();
+    for (i, j, want) in [
+        (0, 0, 3.445502646),
+        (1, 0, -0.255555556),
+        (1, 1, -0.677678571),
+        (2, 0, -0.203174603),
+        (2, 1, 0.014285714),
+        (2, 2, 0.08),
+        (3, 0, 0.069312169),
+        (3, 1, 0.041170635),
+        (3, 2, 0.007301587),
+        (3, 3, 0.000205026),
+    ] {
+        let other = 60 - i - 11 * j;
+        let got = matrix.rows[60].iter().find(|e| e.0 == other).map_or(0.0, |e| e.1);
+        near(got, want);
+    }
+}
