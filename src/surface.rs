@@ -52,9 +52,10 @@ pub use ridge::{Heights, Ridge};
 pub use ruled::{Density, RuledFault, check as check_ruled, mesh as ruled_mesh};
 pub use rungs::{Rungs, rungs};
 pub use subdivide::{
-    ClosedForm, CoonsMesh, CoonsRules, CreasedMesh, EvaluateError, Handle, IsoFault, LimitRows,
-    LimitSurface, MOST_FACES, PolyMesh, SHARP, Sample, SpacedMesh, SubdivideError, Topology,
-    adaptive, coons, iso_line, limit, limit_rows, subdivide,
+    ClosedForm, CoonsMesh, CoonsRules, CreasedMesh, Edit, EditError, EditRules, Edited,
+    EvaluateError, Handle, IsoFault, LimitRows, LimitSurface, MOST_FACES, Method, PolyMesh, SHARP,
+    Sample, SpacedMesh, Spot, SubdivideError, Topology, adaptive, coons, edit, iso_line, limit,
+    limit_rows, subdivide,
 };
 
 use crate::geom::{Bounds, Grid, Tolerance};
