@@ -163,6 +163,10 @@ impl Lattice {
     }
 
     /// The ends of the spans of the rows of a batch.
+    #[allow(
+        clippy::needless_range_loop,
+        reason = "lanes: the loops must stay plain to become vectors"
+    )]
     #[inline(always)]
     fn solve<const N: usize, S: Shape<N>>(&self, batch: &mut Batch, shape: &S) {
         let (origin, pitch) = (self.grid.origin, self.grid.pitch_mm);

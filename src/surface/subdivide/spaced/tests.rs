@@ -211,8 +211,8 @@ fn a_fan_of_five_with_one_long_spoke_is_refined_as_tabled() {
 fn sign_less(matrix: &[Vec<f64>], lambda: f64) -> f64 {
     let mut a = matrix.to_vec();
     let mut sign = 1.0;
-    for k in 0..a.len() {
-        a[k][k] -= lambda;
+    for (k, row) in a.iter_mut().enumerate() {
+        row[k] -= lambda;
     }
     for k in 0..a.len() {
         let pivot = (k..a.len()).max_by(|&i, &j| a[i][k].abs().total_cmp(&a[j][k].abs())).unwrap();
@@ -221,11 +221,10 @@ fn sign_less(matrix: &[Vec<f64>], lambda: f64) -> f64 {
             sign = -sign;
         }
         sign *= a[k][k].signum();
-        for i in k + 1..a.len() {
-            let factor = a[i][k] / a[k][k];
-            for j in k..a.len() {
-                a[i][j] -= factor * a[k][j];
-            }
+        let (done, rest) = a.split_at_mut(k + 1);
+        for row in rest {
+            let factor = row[k] / done[k][k];
+            row.iter_mut().zip(&done[k]).skip(k).for_each(|(x, pivot)| *x -= factor * pivot);
         }
     }
     sign
@@ -237,7 +236,7 @@ fn a_long_spoke_draws_the_leading_eigenvalues_apart_as_tabled() {
     let tabled =
         [(2.0, 0.5927, 0.5291, 5e-5), (3.0, 0.6233, 0.5301, 5e-5), (10.0, 0.718, 0.582, 5e-4)];
     for (long, first, second, digit) in tabled {
-        let mut matrix = vec![vec![0.0; 11]; 11];
+        let mut matrix = vec![Vec::new(); 11];
         for from in 0..11 {
             let mut coarse = fan_of_five(long);
             for (v, at) in coarse.mesh.vertices.iter_mut().enumerate() {
@@ -250,7 +249,7 @@ fn a_long_spoke_draws_the_leading_eigenvalues_apart_as_tabled() {
                     _ if to % 2 == 1 => edge_of(&coarse, 0, to),
                     _ => face_of(&coarse, to as usize / 2 - 1),
                 };
-                matrix[to as usize][from] = fine.mesh.vertices[now].z;
+                matrix[to as usize].push(fine.mesh.vertices[now].z);
             }
         }
         for one in [first, second] {
