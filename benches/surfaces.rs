@@ -7,6 +7,11 @@
 mod shapes;
 
 use relievo::compare::tables::{CREASES, FINE, Method, Outline, Raised, crease, shapes, summary};
+use relievo::geom::DVec3;
+use relievo::job::Scheme;
+use relievo::surface::{
+    CoonsRules, Edit, EditRules, LimitSurface, PolyMesh, Spot, coons, edit, subdivide,
+};
 use shapes::Ladder;
 use std::time::Instant;
 
@@ -62,4 +67,45 @@ fn main() {
             seam.name()
         );
     }
+    meshes();
+}
+
+/// What edits, Coons patches and Catmull and Clark's rules cost on meshes of known sizes.
+fn meshes() {
+    println!("\n| work | s |");
+    println!("|---|---|");
+    let big = LimitSurface::of(&sheet(317, 317), |_, _| false).expect("a sheet is a manifold");
+    for (rings, name) in [(Some(4), "4 rings"), (Some(40), "40 rings"), (None, "everywhere")] {
+        let at = Spot { face: 50_000, part: None, u: 0.3, v: 0.6 };
+        let normal = Some(DVec3::new(0.1, 0.2, 1.0));
+        let point = Edit::Point { at, by: Some(DVec3::Z), normal };
+        let rules = EditRules { rings, ..EditRules::default() };
+        let start = Instant::now();
+        let edited = edit(&big, &[point], &rules).expect("the boundary holds the sheet");
+        let seconds = start.elapsed().as_secs_f64();
+        assert!(edited.conflicts().is_empty(), "one edit contradicts nothing");
+        println!("| energy edit on 100489 vertices, free: {name} | {seconds:.2} |");
+    }
+    let start = Instant::now();
+    let rules = CoonsRules { draft_rad: Some(0.5), ..CoonsRules::default() };
+    let fine = coons(&sheet(21, 11), rules, 5).expect("a sheet is a manifold");
+    let seconds = start.elapsed().as_secs_f64();
+    println!("| Coons, 200 quads, 5 levels: {} faces | {seconds:.2} |", fine.len());
+    let start = Instant::now();
+    let fine = subdivide(&sheet(26, 21), Scheme::CatmullClark, 5).expect("a sheet is a manifold");
+    let seconds = start.elapsed().as_secs_f64();
+    println!("| Catmull-Clark, 500 quads, 5 levels: {} faces | {seconds:.2} |", fine.len());
+}
+
+/// A wavy sheet of so many vertices along x and y.
+fn sheet(nx: u32, ny: u32) -> PolyMesh {
+    let mut mesh = PolyMesh::new();
+    for k in 0..nx * ny {
+        let (x, y) = (f64::from(k % nx), f64::from(k / nx));
+        mesh.add_vertex(DVec3::new(x, y, 3.0 * libm::sin(0.1 * x) * libm::cos(0.07 * y)), false);
+    }
+    for k in (0..nx * (ny - 1) - 1).filter(|k| k % nx < nx - 1) {
+        mesh.add_face(&[k, k + 1, k + nx + 1, k + nx]);
+    }
+    mesh
 }

@@ -17,6 +17,9 @@ use std::collections::VecDeque;
 /// A feed is set by the wood that is met within this distance before and after, mm.
 const NEARBY_MM: f64 = 1.0;
 
+/// The last digit of a program, mm.
+const STEP_MM: f64 = 0.001;
+
 /// Three decimals, z rounded up: the program's text holds exactly what was planned.
 pub(super) fn on_program_grid(p: DVec3) -> DVec3 {
     let near = |v: f64| (v * 1000.0).round() / 1000.0;
@@ -148,7 +151,11 @@ impl<'a> Emitter<'a> {
         self.rapid(above, low);
         let mut at = low;
         for &p in entry.iter().chain(&chain[1..]) {
-            at = self.feed(at, on_program_grid(p));
+            let to = on_program_grid(p);
+            // Points closer together than the program can say: the last digit alone is no reason for a plunge.
+            if at.truncate() != to.truncate() || !(0.0..1.5 * STEP_MM).contains(&(at.z - to.z)) {
+                at = self.feed(at, to);
+            }
         }
     }
 
