@@ -72,8 +72,7 @@ pub(super) fn load(path: &Path) -> Result<Input> {
         return Ok(input(draft, Artwork::none()));
     }
     if artwork_file.extension().is_some_and(|e| e.eq_ignore_ascii_case("obj")) {
-        let message = "a mesh is no artwork: take this line out and give a layer the line mesh = \"FILE.obj\"";
-        return Err(draft.unreadable_artwork(message).into());
+        return Err(draft.mesh_as_artwork().into());
     }
     let bytes = match files::read(&artwork_file) {
         Err(e) if artwork_file != path => {

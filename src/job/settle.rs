@@ -116,6 +116,13 @@ impl Draft {
         JobError::Unreadable(self.source.fault(span, message, "", help))
     }
 
+    /// The error for a mesh in the place of artwork, where the job names it.
+    pub fn mesh_as_artwork(&self) -> JobError {
+        let help = "take this line out and give a layer the line mesh = \"FILE.obj\"";
+        let span = self.source.span_of(&["artwork.file"]);
+        JobError::Unreadable(self.source.fault(span, "a mesh is a layer, not artwork", "", help))
+    }
+
     /// The error for a font folder that cannot be read, at the place where the job names it.
     pub fn unreadable_fonts(&self, message: &str) -> JobError {
         let help = "a path is seen from the job file's folder";

@@ -312,10 +312,6 @@ fn height_on(path: &[Sample], s: f64) -> f64 {
     a.z + (b.z - a.z) * ((s - a.s) / (b.s - a.s))
 }
 
-/// Heights of wood are `f32`: at 4 mm they are off by up to half a step of theirs, 2.4e-7, and a floor that was cut at -1.77
-/// stands a hair above -1.77.
-const HEIGHT_STEP_MM: f64 = 2.4e-7;
-
 /// Rapids down and straight plunges end above the wood; the first sloping piece after them is no steeper than
 /// the ramp. (The whole descent is tested where it is made.)
 fn assert_entries_are_ramped(path: &Toolpath, job: &Job, wood: &mut Heightfield) {
@@ -325,13 +321,9 @@ fn assert_entries_are_ramped(path: &Toolpath, job: &Job, wood: &mut Heightfield)
     for m in &path.moves {
         if m.is_rapid() {
             entering = true;
-            assert!(!gouges(wood, &profile, m.to, HEIGHT_STEP_MM), "rapid into wood at {}", m.to);
+            assert!(!gouges(wood, &profile, m.to, 0.0), "rapid into wood at {}", m.to);
         } else if m.from.truncate() == m.to.truncate() && m.to.z < m.from.z {
-            assert!(
-                entering && !gouges(wood, &profile, m.to, HEIGHT_STEP_MM),
-                "straight down at {}",
-                m.to
-            );
+            assert!(entering && !gouges(wood, &profile, m.to, 0.0), "straight down at {}", m.to);
         } else if entering {
             let down = m.from.z - m.to.z;
             let run = m.to.truncate().distance(m.from.truncate());
