@@ -405,13 +405,17 @@ impl Sweep<'_> {
             Joint::Shared { mp, look_mm } if turned => bound(end - look_mm, -mp),
             Joint::Shared { mp, look_mm } => bound(end + look_mm, mp),
         };
+        // A node on the curve itself belongs to both moves, not to neither: a curve across a column of nodes, as between
+        // moves along Y, has no ends in x that could take the allowance.
+        let [lo, hi] = if turned { [last, first] } else { [first, last] };
+        let shifted = |bound: Option<Bound>, by: f64| bound.map(|b| Bound { c: b.c + by, ..b });
         Self::Along(Along {
             low: if turned { mv.to } else { mv.from },
             dir,
             len: course.len,
             m: course.m.abs(),
             tip,
-            ends: if turned { [last, first] } else { [first, last] },
+            ends: [shifted(lo, -SPAN_SLACK_MM), shifted(hi, SPAN_SLACK_MM)],
         })
     }
 
@@ -466,10 +470,11 @@ impl Shape<4> for Stamp {
     fn spans(&self, dy: f64, _: f64) -> [Span; 4] {
         let mut out = [disc_row(self.tip.radius, dy), Span::EMPTY, Span::EMPTY, Span::EMPTY];
         for (behind, inside) in self.wedge.iter().flatten() {
-            let row = behind.row(0.0, dy);
             if *inside {
+                let row = behind.row(SPAN_SLACK_MM, dy);
                 out = out.map(|o| o.meet(row));
             } else {
+                let row = behind.row(-SPAN_SLACK_MM, dy);
                 let [a, b] = out[0].without(row);
                 let [c, d] = out[1].without(row);
                 out = [a, b, c, d];

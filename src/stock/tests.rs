@@ -471,6 +471,53 @@ fn a_retract_from_the_end_of_a_cut_meets_no_wood() {
 }
 
 proptest! {
+    #![proptest_config(ProptestConfig { cases: 96, ..ProptestConfig::default() })]
+
+    /// Passes along rows and columns of nodes, with joints on the nodes: places on the border of two moves belong to one
+    /// of them at least, whatever the rounding.
+    #[test]
+    fn a_chain_on_the_nodes_equals_its_moves_alone(
+        steps in prop::collection::vec((0usize..16, 1u8..4, 2u8..30), 3..24),
+        (column, row) in (30u8..60, 30u8..60),
+        aside in prop_oneof![Just(0.0), Just(0.003)],
+        which in 0usize..12,
+    ) {
+        const WAYS: [[i32; 2]; 8] =
+            [[1, 0], [0, 1], [-1, 0], [0, -1], [1, 1], [-1, 1], [-1, -1], [1, -1]];
+        let (mut i, mut j) = (i32::from(column), i32::from(row));
+        let at = |i: i32, j: i32, z: f64| [f64::from(i) / 10.0 - aside, f64::from(j) / 10.0, z];
+        let (mut path, mut straight) = (vec![at(i, j, -2.0)], 0);
+        for (way, count, level) in steps {
+            // Half of the steps go straight on, a third of them level.
+            straight = if way < 8 { way } else { straight };
+            let [x, y] = WAYS[straight].map(|w| w * i32::from(count));
+            (i, j) = ((i + x).clamp(20, 90), (j + y).clamp(20, 80));
+            let last = path[path.len() - 1][2];
+            path.push(at(i, j, if level < 20 { -0.25 * f64::from(level) } else { last }));
+        }
+        let moves = chain(&path);
+        // Radii that put no node on a rim.
+        let profile = match which {
+            0..6 => Profile::Ball { radius_mm: 1.4937 },
+            6..9 => Profile::Flat { radius_mm: 1.6173 },
+            _ => slim(which - 9),
+        };
+        let (mut whole, mut alone) = (block(0.1), block(0.1));
+        whole.cut(&profile, &moves);
+        for m in &moves {
+            alone.cut(&profile, &[*m]);
+        }
+        for (k, (a, b)) in whole.field().z().iter().zip(alone.field().z()).enumerate() {
+            let grid = whole.field().grid();
+            prop_assert!(
+                (a - b).abs() < 2e-5,
+                "{:?}: {} in the chain, {} alone", grid.node(k % grid.nx, k / grid.nx), a, b
+            );
+        }
+    }
+}
+
+proptest! {
     /// A move is clear of wood exactly where cutting with it alone would remove nothing.
     #[test]
     fn a_move_is_clear_where_it_alone_removes_nothing(
