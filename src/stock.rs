@@ -73,6 +73,9 @@ const THIN_NODES: f64 = 2.0;
 /// From so many moves on the table of a convex end's reach ([`Reach`]) takes less time than it saves.
 const REACH_PAYS_FROM_MOVES: usize = 8;
 
+/// Thinner chips are no chips: places that two ways of reckoning reach differ in the last bit, mm.
+const ROUND_OFF_MM: f32 = 1e-5;
+
 /// Rapids carve with a cutter this much slimmer, mm: a retract from the end of a cut grazes nodes that lie just on
 /// the rim of the cut, and whether round-off puts them in or out must not look like a rapid through wood.
 const RAPID_SLIM_MM: f64 = 1e-5;
@@ -119,13 +122,13 @@ impl Block {
         self.cut_alone(profile, moves, |_| false)
     }
 
-    /// True where a move by itself would remove nothing of the wood as it is.
+    /// True where a move by itself would remove nothing of the wood as it is, but for round-off.
     pub fn is_clear_of(&self, profile: &Profile, mv: &Move) -> bool {
         let radius_mm = profile.radius_mm() + 0.5 * mv.from.truncate().distance(mv.to.truncate());
         let middle = mv.from.midpoint(mv.to).truncate();
         let Some(field) = self.field.near(middle, radius_mm) else { return true };
         let mut part = Self { field, top_mm: self.top_mm, thickness_mm: self.thickness_mm };
-        part.cut(profile, std::slice::from_ref(mv))[0].deepest_mm == 0.0
+        part.cut(profile, std::slice::from_ref(mv))[0].deepest_mm <= ROUND_OFF_MM
     }
 
     /// As [`Block::cut`]; the moves that `alone` names (by index) are credited with all the wood that

@@ -6,7 +6,7 @@
 //! whose best place lies beyond it.
 
 use super::lattice::{Lattice, Piece, Shape};
-use super::sweep::{Left, SPAN_SLACK_MM, Span, VERTICAL_MM, disc_row, high, low};
+use super::sweep::{Left, RIM_MM, SPAN_SLACK_MM, Span, VERTICAL_MM, disc_row, high, low};
 use crate::cutter::Turned;
 use crate::geom::{DVec2, DVec3, Move};
 
@@ -373,10 +373,11 @@ impl Shape<2> for Drawn<'_> {
         let (s, q) = (self.u.dot(d), self.u.perp_dot(d));
         if self.len == 0.0 {
             let off = d.length();
-            let z = if off <= r { self.low.z + self.form.height(off) } else { f64::INFINITY };
+            let z =
+                if off <= r - RIM_MM { self.low.z + self.form.height(off) } else { f64::INFINITY };
             return Left { z, ..nothing };
         }
-        if q.abs() > r {
+        if q.abs() > r - RIM_MM {
             return nothing;
         }
         let best = s - self.touch(q.abs());
@@ -387,8 +388,9 @@ impl Shape<2> for Drawn<'_> {
         }
         let at = best.clamp(0.0, self.len);
         let off2 = q * q + (s - at) * (s - at);
-        // A free optimum lies on the chord itself; round-off must not lose it.
-        let beyond = if at == best { r + SPAN_SLACK_MM } else { r };
+        // A free optimum lies on the chord itself: it counts, but not where the move ends with it.
+        let is_free = (-RIM_MM..self.len - RIM_MM).contains(&best);
+        let beyond = if is_free { r + SPAN_SLACK_MM } else { r - RIM_MM };
         if off2 > beyond * beyond {
             return nothing;
         }

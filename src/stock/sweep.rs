@@ -85,6 +85,10 @@ pub(super) fn high(a: f64, b: f64) -> f64 {
 /// Round-off allowance at the ends of spans, mm: they keep nodes this far outside.
 pub(super) const SPAN_SLACK_MM: f64 = 1e-6;
 
+/// Cutters are this much slimmer than they are, mm: whether a node exactly on the rim is cut would hang on the last bit, and
+/// differ from one way of asking to another. Far above the rounding of places, far below that of heights.
+pub(super) const RIM_MM: f64 = 1e-8;
+
 /// A move shorter than this in plan is a plunge or a retract, mm.
 pub(super) const VERTICAL_MM: f64 = 1e-9;
 
@@ -97,7 +101,8 @@ pub(super) struct Tip {
 
 impl Tip {
     pub(super) fn of(profile: &Profile) -> Self {
-        Self { radius: profile.radius_mm(), flat: matches!(profile, Profile::Flat { .. }) }
+        let radius = profile.radius_mm() - RIM_MM;
+        Self { radius, flat: matches!(profile, Profile::Flat { .. }) }
     }
 }
 

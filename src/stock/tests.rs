@@ -39,6 +39,12 @@ fn chain(points: &[[f64; 3]]) -> Vec<Move> {
 fn searched(profile: &Profile, reach: f64, moves: &[Move], p: DVec2) -> f64 {
     let mut lowest = 0.0_f64;
     for m in moves {
+        // The nearest place of the move in plan: farther away it cannot count.
+        let (a, way) = (m.from.truncate(), (m.to - m.from).truncate());
+        let near = ((p - a).dot(way) / way.length_squared().max(1e-300)).clamp(0.0, 1.0);
+        if (a + way * near).distance(p) > reach + 1e-9 {
+            continue;
+        }
         let z = |t: f64| {
             let at = m.from + (m.to - m.from) * t;
             let d = at.truncate().distance(p);
@@ -496,13 +502,24 @@ proptest! {
             path.push(at(i, j, if level < 20 { -0.25 * f64::from(level) } else { last }));
         }
         let moves = chain(&path);
-        // Radii that put no node on a rim.
+        // Whole radii put nodes on the rim.
         let profile = match which {
-            0..6 => Profile::Ball { radius_mm: 1.4937 },
-            6..9 => Profile::Flat { radius_mm: 1.6173 },
+            0..3 => Profile::Ball { radius_mm: 1.4937 },
+            3..6 => BALL,
+            6..8 => Profile::Flat { radius_mm: 1.6173 },
+            8 => FLAT,
+            9 => convex_forms().swap_remove(usize::from(column) % 12),
             _ => slim(which - 9),
         };
         let (mut whole, mut alone) = (block(0.1), block(0.1));
+        // Asked of a part of the grid, whose nodes lie elsewhere in the last bit.
+        for m in &moves {
+            let clear = whole.is_clear_of(&profile, m);
+            let met = whole.cut(&profile, &[*m])[0].deepest_mm;
+            prop_assert!(if clear { met < 2e-5 } else { met > 5e-6 }, "clear: {clear}, met {met}");
+            prop_assert!(whole.is_clear_of(&profile, m), "carved already");
+        }
+        let mut whole = block(0.1);
         whole.cut(&profile, &moves);
         for m in &moves {
             alone.cut(&profile, &[*m]);
