@@ -4,6 +4,7 @@ mod carve;
 mod check;
 #[cfg(unix)]
 mod controller;
+mod edit;
 mod files;
 mod inputs;
 mod lists;
@@ -54,6 +55,8 @@ enum Command {
     New(new::Args),
     /// Compare all surface methods over artwork: pictures, cross-sections and figures side by side
     Surfaces(surfaces::Args),
+    /// Show what the shape edits of a job change: before, after and the change map, without a carving
+    Edit(edit::Args),
     /// Dry run of any programs: what they cut, what they miss, what they would break
     Simulate(Box<simulate::Args>),
     /// Tell how long a program takes on a machine, by GRBL's own planner
@@ -112,6 +115,7 @@ pub fn main() -> ExitCode {
         Command::Check(args) => check::run(&args),
         Command::New(args) => new::run(&args),
         Command::Surfaces(args) => surfaces::run(&args),
+        Command::Edit(args) => edit::run(&args),
         Command::Simulate(args) => simulate::run(&args),
         Command::Time(args) => time::run(&args),
         Command::Stream(args) => stream::run(&args),

@@ -15,6 +15,7 @@ mod library;
 mod draft;
 mod speeds;
 mod crest;
+mod edit;
 mod mesh;
 mod layer;
 mod group;
@@ -26,6 +27,7 @@ mod tests;
 
 pub use colors::swatch_name;
 pub use draft::Draft;
+pub use edit::{EditMethod, EditPlace, EditSpec, EditTarget, EditsSpec, MOST_EDITS, Written};
 pub use error::{Fault, JobError};
 pub use group::GroupSpec;
 pub use library::{BUILT_IN_FILES, Library};

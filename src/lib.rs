@@ -180,8 +180,20 @@ pub fn design(
     models: &[Model],
     enter: &mut dyn FnMut(&str),
 ) -> Result<Design, CarveError> {
+    design_of(draft.settle(&found(artwork, models))?, artwork, models, enter)
+}
+
+/// The same of a job that is settled: every stage up to the target.
+///
+/// # Errors
+/// As [`carve`].
+pub fn design_of(
+    job: Job,
+    artwork: &Artwork,
+    models: &[Model],
+    enter: &mut dyn FnMut(&str),
+) -> Result<Design, CarveError> {
     enter("outlines");
-    let job = draft.settle(&found(artwork, models))?;
     let placed = artwork.place(&job.layers, job.artwork_unit_mm, job.artwork_lower_left_mm)?;
     let mut outlines = outline::trace(&placed, &job.layers, &job.tolerance)?;
     enter("surfaces");

@@ -13,7 +13,10 @@ mod obj;
 use crate::geom::{DVec3, Grid, Ring, orient};
 use crate::job::{Job, LayerSpec, MeshSpec, SurfaceSpec};
 use crate::outline::{Figure, Outlines, RegionFault, silhouette};
-use crate::surface::{CreasedMesh, Mesh, Raised, SubdivideError, Surface, levels};
+use crate::surface::{
+    CreasedMesh, EditFault, Mesh, Raised, Refined, Remark, SubdivideError, Surface, draw_to,
+    levels, tell,
+};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 
@@ -108,6 +111,14 @@ pub enum ModelError {
         /// Why.
         why: RegionFault,
     },
+    /// A shape edit of the layer cannot be made.
+    #[error("layer '{layer}': {fault}")]
+    Edit {
+        /// Name of the layer.
+        layer: String,
+        /// Where it is asked for, why not and what to change.
+        fault: EditFault,
+    },
     /// The models are not those of the job.
     #[error("the job names {wanted} meshes, but {given} were read: a fault of the program")]
     Count {
@@ -178,6 +189,7 @@ impl Model {
         layer: &LayerSpec,
         spec: &MeshSpec,
         cell_mm: f64,
+        remarks: &mut Vec<Remark>,
     ) -> Result<[Mesh; 2], ModelError> {
         let control = self.placed(layer, spec);
         let corners: usize = control.mesh().faces().map(<[u32]>::len).sum();
@@ -187,7 +199,13 @@ impl Model {
             return Err(ModelError::TooFine { file: self.file.clone(), levels, faces });
         }
         let fine = control.limit(levels);
-        let fine = fine.map_err(|why| ModelError::Mesh { file: self.file.clone(), why })?;
+        let mut fine = fine.map_err(|why| ModelError::Mesh { file: self.file.clone(), why })?;
+        if let Some(edits) = &layer.edits {
+            let all: Vec<usize> = (0..edits.list.len()).collect();
+            let from = Refined { control: control.mesh(), levels };
+            draw_to(edits, &all, &from, &mut fine, remarks)
+                .map_err(|fault| ModelError::Edit { layer: layer.name.clone(), fault })?;
+        }
         let Mesh { vertices, faces } = fine.to_triangles();
         let area = |face: &[u32; 3]| {
             let [a, b, c] = face.map(|v| vertices[v as usize].truncate());
@@ -224,6 +242,15 @@ fn named(job: &Job) -> impl Iterator<Item = (usize, &LayerSpec, &MeshSpec)> {
     })
 }
 
+/// The surface of a layer that is a mesh.
+struct Made {
+    figure: Figure,
+    surface: Surface,
+    /// Parts of it lie below others.
+    hidden: bool,
+    remarks: Vec<Remark>,
+}
+
 /// Fills in the layers that are meshes: `models` are those of the job, in the order of its layers. `outlines` and `raised`
 /// get one figure and its surface for each.
 ///
@@ -241,12 +268,13 @@ pub fn raise(
         return Err(ModelError::Count { wanted: named.len(), given: models.len() });
     }
     let chord_mm = job.tolerance.chord_mm;
-    let made: Vec<Result<(Figure, Surface, bool), ModelError>> = named
+    let made: Vec<Result<Made, ModelError>> = named
         .par_iter()
         .zip(models)
         .with_max_len(1)
         .map(|(&(_, layer, spec), model)| {
-            let meshes = model.triangles(layer, spec, grid.pitch_mm)?;
+            let mut remarks = Vec::new();
+            let meshes = model.triangles(layer, spec, grid.pitch_mm, &mut remarks)?;
             let rings: Vec<Ring> = meshes.iter().flat_map(rim).collect();
             let regions = silhouette(&rings, chord_mm * chord_mm)
                 .map_err(|why| ModelError::Outline { file: model.file.clone(), why })?;
@@ -256,11 +284,15 @@ pub fn raise(
             let figure = Figure { source: format!("the mesh {}", model.file), regions };
             let hidden = !model.is_closed && !meshes[1].faces.is_empty();
             let parts = meshes.into_iter().filter(|mesh| !mesh.faces.is_empty());
-            Ok((figure, Surface::Parts(parts.map(Surface::Mesh).collect()), hidden))
+            let surface = Surface::Parts(parts.map(Surface::Mesh).collect());
+            Ok(Made { figure, surface, hidden, remarks })
         })
         .collect();
     for ((made, model), (k, layer, _)) in made.into_iter().zip(models).zip(named) {
-        let (figure, surface, hidden) = made?;
+        let Made { figure, surface, hidden, remarks } = made?;
+        let told: Vec<(&str, Remark)> =
+            remarks.into_iter().map(|r| (model.file.as_str(), r)).collect();
+        tell(layer, &told, grid.pitch_mm, &mut raised.notes);
         outlines.layers[k].figures = vec![figure];
         raised.surfaces[k] = vec![surface];
         raised.notes.extend(model.notes.iter().cloned());

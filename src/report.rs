@@ -8,6 +8,7 @@
 //!               --> depth_png      16-bit grey, one pixel a node, for machines
 //!               --> stl, obj       closed solid
 //!   deviation   --> deviation_png  what is left above the target or cut below it
+//!   two reliefs  --> change_png     what shape edits raised and lowered
 //!   moves       --> paths_png      toolpaths over the board, coloured by depth or by feed
 //!   lines       --> sections_png   cross-sections: design, carved, stock and cutter
 //!   stages      --> steps_png      the stock before and after each program, and what it removed
@@ -16,6 +17,7 @@
 //! ```
 
 mod canvas;
+mod change;
 mod data;
 mod depth;
 mod deviation;
@@ -37,6 +39,7 @@ mod strokes;
 mod summary;
 mod surfaces;
 
+pub use change::change_png;
 pub use data::{
     Check, CutterRow, LayerRow, LeftoverRow, Picture, ProgramRow, ReportData, StockFacts,
 };

@@ -10,6 +10,7 @@ mod crest;
 mod crested;
 mod distance;
 mod drawn;
+mod edits;
 mod fields;
 mod halfplanes;
 mod harmonic;
@@ -36,6 +37,7 @@ pub use drawn::{
     Control, Course, CrestFault, DrawnCrest, DrawnSettings, control_over, drawn_path,
     drawn_surface, levels,
 };
+pub use edits::{EditFault, Refined, draw_to};
 pub use fields::{Rise, r_function, scan_lines};
 pub use halfplanes::{r_conjunction, r_disjunction};
 pub use inscribed::inscribed_radius;
@@ -54,8 +56,8 @@ pub use rungs::{Rungs, rungs};
 pub use subdivide::{
     ClosedForm, CoonsMesh, CoonsRules, CreasedMesh, Edit, EditError, EditRules, Edited,
     EvaluateError, Handle, IsoFault, LimitRows, LimitSurface, MOST_FACES, Method, PolyMesh, SHARP,
-    Sample, SpacedMesh, Spot, SubdivideError, Topology, adaptive, coons, edit, iso_line, limit,
-    limit_rows, subdivide,
+    Sample, SpacedMesh, SparseRow, Spot, SubdivideError, Topology, adaptive, coons, edit, iso_line,
+    limit, limit_rows, subdivide,
 };
 
 use crate::geom::{Bounds, Grid, Tolerance};
@@ -99,6 +101,14 @@ pub enum SurfaceError {
         layer: String,
         /// Why: what, where and what to change.
         fault: CrestFault,
+    },
+    /// A shape edit of the layer cannot be made.
+    #[error("layer '{layer}': {fault}")]
+    Edit {
+        /// Name of the layer.
+        layer: String,
+        /// Where it is asked for, why not and what to change.
+        fault: EditFault,
     },
     /// A setting of the layer is NaN, infinite or of the wrong sign.
     #[error("layer '{layer}': {key} = {value} cannot be used; {cure}")]
@@ -183,6 +193,22 @@ pub enum Remark {
         /// The first of them, mm.
         at: crate::geom::DVec2,
     },
+    /// A shape edit is not met: it contradicts others or what is held, or its penalty lets it.
+    EditMissed {
+        /// Its number in the layer, from 0.
+        edit: usize,
+        /// By how much its height or point is missed, mm.
+        by_mm: f64,
+        /// By how much its normal is missed, radians.
+        by_rad: f64,
+    },
+    /// The surface folds over itself beside an edit that moves it in space.
+    EditFolded {
+        /// Its number in the layer, from 0.
+        edit: usize,
+        /// Where, mm.
+        at: crate::geom::DVec2,
+    },
     /// The ridge was asked to lie below the outline; it lies level with it.
     RidgeBelowBase,
     /// It reaches past the edge of the stock and is cut off there.
@@ -242,10 +268,10 @@ pub fn raise(
         }
         (SurfaceSpec::Drawn(spec), _) => {
             let over = drawn::Over { layer, spec, ridges, grid, tolerance };
-            drawn::raise(figure, &over, &mut remarks)
-                .map_err(|fault| SurfaceError::Crest { layer: layer.name.clone(), fault })?
+            drawn::raise(figure, &over, &mut remarks)?
         }
-        (_, Some(crest)) => crested::raise(figure, layer, crest, grid, tolerance, &mut remarks),
+        (_, Some(crest)) => crested::raise(figure, layer, crest, grid, tolerance, &mut remarks)
+            .map_err(|fault| SurfaceError::Edit { layer: layer.name.clone(), fault })?,
         (_, None) => Surface::Parts(Vec::new()),
     };
     Ok(RaisedFigure { surface, remarks })
@@ -265,6 +291,10 @@ pub fn raise_all(
     for (outline, layer) in outlines.layers.iter().zip(layers) {
         drawn::check_used(outline, layer)
             .map_err(|fault| SurfaceError::Crest { layer: layer.name.clone(), fault })?;
+        if layer.mesh().is_none() {
+            edits::check_used(outline, layer)
+                .map_err(|fault| SurfaceError::Edit { layer: layer.name.clone(), fault })?;
+        }
     }
     let figures: Vec<(usize, &Figure)> = (outlines.layers.iter().enumerate().take(layers.len()))
         .flat_map(|(l, layer)| layer.figures.iter().map(move |figure| (l, figure)))

@@ -699,6 +699,91 @@ fn surfaces_that_cannot_be_compared_are_refused() {
     refused(&desk, &["surfaces", "--figures", "--method", "butterfly-original"], 2, &["tabled"]);
 }
 
+const EDITED: &str = r#"
+title = "Edited"
+[artwork]
+file = "leaf.svg"
+[stock]
+width_mm = 40
+height_mm = 30
+thickness_mm = 10
+[relief]
+pitch_mm = 0.2
+depth_mm = 6
+[[layer]]
+name = "leaf"
+select = "fill:#2a7f3f"
+surface = { method = "catmull-clark", control = "quads" }
+height_mm = 2
+[[layer.edit]]
+at = [13, 17]
+height_mm = 2.6
+normal = [-0.2, 0.1, 1]
+[[layer.edit]]
+at = [27.5, 13]
+height_mm = 1.9
+"#;
+
+#[test]
+fn edits_are_shown_before_and_after_and_hold_in_the_heightfield() {
+    let desk = Desk::new();
+    desk.put("leaf.svg", LEAF);
+    desk.put("job.toml", EDITED);
+    let out = desk.run(&["edit", "job.toml", "--json"]);
+    assert!(out.status.success(), "{}", stderr(&out));
+    let told = json_of(&out);
+    let edits = told["edits"].as_array().unwrap();
+    for (edit, wanted) in edits.iter().zip([2.6, 1.9]) {
+        let [before, after] =
+            ["before_mm", "after_mm"].map(|key| edit[key].as_f64().unwrap() - wanted);
+        // Flanks rise by less than 1 in 1: within a cell the surface strays by less than a sixth of its diagonal.
+        assert!(after.abs() < 0.05 && before.abs() > 0.15, "{edit}");
+    }
+    assert_eq!((edits.len(), edits[1]["written"].as_str()), (2, Some("job.toml:22:6")));
+    let names: Vec<String> = desk.files().into_keys().filter(|n| n.contains("job-edit/")).collect();
+    let wanted = ["after.png", "before.png", "change.png"].map(|n| format!("job-edit/{n}"));
+    assert_eq!(names, wanted);
+    let threads = |n: &str| {
+        let folder = format!("threads-{n}");
+        let out = desk.run(&["edit", "job.toml", "--out", &folder, "--threads", n]);
+        assert!(out.status.success() && String::from_utf8_lossy(&out.stdout).contains("2.600"));
+        std::fs::read(desk.dir.path().join(folder).join("change.png")).unwrap()
+    };
+    assert!(threads("1") == threads("2"));
+}
+
+#[test]
+fn edits_that_cannot_be_made_are_refused_and_contradictions_told() {
+    let desk = Desk::new();
+    desk.put("leaf.svg", LEAF);
+    let refused = |job: &str, says: &str| {
+        desk.put("job.toml", job);
+        let before = desk.files();
+        for command in ["edit", "carve"] {
+            let out = desk.run(&[command, "job.toml"]);
+            let text = stderr(&out);
+            assert!(out.status.code() == Some(1) && text.contains(says), "{command}: {text}");
+        }
+        assert_eq!(desk.files(), before);
+    };
+    let away = EDITED.replace("[27.5, 13]", "[2, 2]");
+    refused(&away, "layer 'leaf': job.toml:22:6: the layer has no surface at [2.000, 2.000]");
+    let steep = EDITED.replace("[-0.2, 0.1, 1]", "[1, 0, 0.01]");
+    refused(&steep, "job.toml:18:6: a surface that moves up and down alone cannot get so steep");
+    let ruled = EDITED.replace("{ method = \"catmull-clark\", control = \"quads\" }", "\"ruled\"");
+    refused(&ruled, "method \"ruled\" cannot be edited");
+    desk.put("job.toml", LEAF_JOB);
+    let out = desk.run(&["edit", "job.toml"]);
+    assert!(out.status.code() == Some(1) && stderr(&out).contains("has no shape edits"));
+    desk.put("job.toml", EDITED.replace("[27.5, 13]", "[13, 17]"));
+    let out = desk.run(&["edit", "job.toml"]);
+    let said = stderr(&out);
+    assert!(
+        out.status.success() && said.contains("edit 2 (job.toml:22:6) is missed by 0.3"),
+        "{said}"
+    );
+}
+
 #[test]
 fn wrong_usage_exits_with_two() {
     let desk = leaf_desk();

@@ -1,5 +1,6 @@
 //! The crest surfaces over the eight test shapes of the specification, held against its tables:
 //! `relievo surfaces --figures` prints the same figures.
+#![allow(clippy::unwrap_used, reason = "a test: what cannot be read should stop it")]
 
 mod shapes;
 
@@ -117,5 +118,66 @@ fn rungs_are_even_and_symmetric() {
         assert!(got.imbalance <= imbalance, "{name}: {got:?}");
         // 1 % of the tabled number.
         assert!(count == 0 || got.count.abs_diff(count) * 100 <= count, "{name}: {got:?}");
+    }
+}
+
+/// The relief of a job over an ellipse of 60 x 40 mm, and what was to be said.
+fn relief_of(layer: &str) -> relievo::Design {
+    use relievo::artwork::{Fonts, read_svg};
+    use relievo::job::{Draft, Library};
+    let job = format!(
+        "[artwork]\nfile = \"a.svg\"\n[stock]\nwidth_mm = 80\nheight_mm = 60\nthickness_mm = 20\n[relief]\npitch_mm = 0.1\n\
+         depth_mm = 9\n[[layer]]\nselect = \"all\"\n{layer}"
+    );
+    let none = |_: &str| Err(std::io::Error::other("there is no other file"));
+    let draft = Draft::from_toml(&job, "job.toml", &Library::built_in(), &none).unwrap();
+    let svg =
+        br#"<svg xmlns="http://www.w3.org/2000/svg" width="60mm" height="40mm" viewBox="0 0 60 40">
+        <ellipse cx="30" cy="20" rx="30" ry="20"/></svg>"#;
+    let artwork = read_svg(svg, &Fonts::none()).unwrap();
+    relievo::design(draft, &artwork, &[], &mut |_| {}).unwrap()
+}
+
+#[test]
+fn edits_hold_in_the_heightfield_up_to_the_bend_within_two_cells() {
+    let crest = "surface = { method = \"crest\", profile = \"cove\" }\nheight_mm = 4\n";
+    let line = "[[layer.crest]]\npoints = [[25, 30, 4], [55, 30, 4]]\n";
+    let rungs = "surface = { method = \"catmull-clark\", control = \"quads\" }\nheight_mm = 5\n";
+    let edit = "[[layer.edit]]\nat = [33.33, 37.77]\nheight_mm = 4.2\nnormal = [0.15, -0.25, 1]\n\
+                [[layer.edit]]\nat = [48.1, 24.6]\nheight_mm = 1.5\n";
+    for (keys, tables) in [(crest, line), (rungs, "")] {
+        let design = relief_of(&format!("{keys}{tables}{edit}"));
+        let plain = relief_of(&format!("{keys}{tables}"));
+        assert!(design.notes.iter().all(|note| !note.contains("missed")), "{:?}", design.notes);
+        let field = &design.relief.target;
+        let pitch = field.grid().pitch_mm;
+        for (at, height, slope) in [
+            (DVec2::new(33.33, 37.77), 4.2, Some(DVec2::new(-0.15, 0.25))),
+            (DVec2::new(48.1, 24.6), 1.5, None),
+        ] {
+            let z = |x: f64, y: f64| field.height_at(at + DVec2::new(x, y) * pitch).unwrap() + 9.0;
+            // How much the surface bends within a cell, round the place.
+            let mut bend = 0.0_f64;
+            for k in 0..25 {
+                let (x, y) = (f64::from(k % 5) - 2.0, f64::from(k / 5) - 2.0);
+                for (dx, dy) in [(1.0, 0.0), (0.0, 1.0), (1.0, 1.0), (1.0, -1.0)] {
+                    let second = z(x + dx, y + dy) - 2.0 * z(x, y) + z(x - dx, y - dy);
+                    bend = bend.max(second.abs());
+                }
+            }
+            assert!(
+                bend < 0.02,
+                "{keys}: the place bends by {bend}, so that nothing would be proved"
+            );
+            assert!((z(0.0, 0.0) - height).abs() <= 2.0 * bend, "{keys}: {} {bend}", z(0.0, 0.0));
+            let before = plain.relief.target.height_at(at).unwrap() + 9.0;
+            assert!((before - height).abs() > 0.2, "{keys}: {before}");
+            if let Some(wanted) = slope {
+                let rise = DVec2::new(z(1.0, 0.0) - z(-1.0, 0.0), z(0.0, 1.0) - z(0.0, -1.0));
+                let off = (rise / (2.0 * pitch)).distance(wanted);
+                assert!(off <= 2.0 * bend / pitch, "{keys}: {off} {bend}");
+                assert!(off < 0.1, "{keys}: {off}");
+            }
+        }
     }
 }

@@ -272,7 +272,7 @@ fn figures(args: &Args, methods: &[&str], stages: &Stages) -> Result<(), Stop> {
 }
 
 /// A length above 0.
-fn length(text: &str) -> Result<f64, String> {
+pub(super) fn length(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(mm) if mm.is_finite() && mm > 0.0 => Ok(mm),
         _ => Err("give a number of millimetres above 0".to_owned()),

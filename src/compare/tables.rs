@@ -407,6 +407,7 @@ fn bevelled(shape: &Shape, grid: &Grid) -> Patch {
         union: false,
         smooth: None,
         visible: false,
+        edits: None,
     };
     let figure = Figure { source: layer.name.clone(), regions: vec![shape.region.clone()] };
     let raised = raise(&figure, &layer, &[], grid, &Tolerance::default()).expect("a sound shape");

@@ -189,6 +189,12 @@ pub(super) const FITS: &[&str] = &["control", "through"];
 pub(super) const SPACINGS: &[&str] = &["uniform", "chord", "centripetal"];
 /// Names of [`super::DrawnCurves`], in its order.
 pub(super) const CURVE_KINDS: &[&str] = &["keep", "points"];
+/// Names of [`super::EditMethod`], in its order of use: energy comes first.
+pub(super) const EDIT_METHODS: &[&str] = &["energy", "least-change"];
+/// Ways in which vertices of an edited mesh move.
+pub(super) const MOVES: &[&str] = &["z", "xyz"];
+/// Directions of iso-lines.
+pub(super) const AXES: &[&str] = &["u", "v"];
 /// Names of [`super::Prune`], in its order.
 pub(super) const PRUNES: &[&str] = &["inscribed", "half-disc"];
 /// Names of [`super::Split`], in its order.
@@ -229,10 +235,28 @@ const fn key(name: &'static str, kind: Kind, default: Fallback, doc: &'static st
 
 use Fallback::{Flag, Number, Required, Rule, Text};
 
+/// A number from 0 to 1.
+const PART: Kind = Kind::Number { min: 0.0, max: 1.0, unit: "" };
+
 /// The sections of a job, in the order in which they are written out.
-pub(super) static JOB: [&Section; 15] = [
-    &TOP, &STOCK, &ARTWORK, &TRACE, &RELIEF, &TOLERANCE, &SAFETY, &KEEP_OUT, &LAYER, &SURFACE,
-    &SMOOTH, &CREST, &MESH, &GROUP, &OPERATION,
+pub(super) static JOB: [&Section; 17] = [
+    &TOP,
+    &STOCK,
+    &ARTWORK,
+    &TRACE,
+    &RELIEF,
+    &TOLERANCE,
+    &SAFETY,
+    &KEEP_OUT,
+    &LAYER,
+    &SURFACE,
+    &SMOOTH,
+    &CREST,
+    &EDIT,
+    &EDIT_RULES,
+    &MESH,
+    &GROUP,
+    &OPERATION,
 ];
 
 /// Top level of a job.
@@ -662,6 +686,18 @@ pub(super) static LAYER: Section = Section {
             Rule("none"),
             "surface = \"crest\" only: the ridge lines, each a [[layer.crest]]",
         ),
+        key(
+            "edit",
+            Kind::Forms("[[layer.edit]] tables"),
+            Rule("none"),
+            "catmull-clark, crest and mesh only: places that the surface is drawn to, each a [[layer.edit]]",
+        ),
+        key(
+            "edit_rules",
+            Kind::Forms("{ method = \"energy\", rings = 4, move = \"z\", ... }"),
+            Rule("as its section says"),
+            "how the edits of the layer are solved, all together",
+        ),
     ],
 };
 
@@ -721,6 +757,100 @@ pub(super) static CREST: Section = Section {
             "half the width of the strip that is level across the crest",
         ),
         key("sharp", Kind::Flag, Flag(false), "a sharp edge in place of the strip"),
+    ],
+};
+
+/// `[[layer.edit]]`
+pub(super) static EDIT: Section = Section {
+    name: "edit",
+    header: "[[layer.edit]]",
+    doc: "a shape edit of the layer above it: a place of its surface and the height, normal or both that it gets there; all \
+          edits of a layer are solved together",
+    keys: &[
+        key(
+            "at",
+            Kind::Forms("[x, y] in mm"),
+            Rule("none: face must be given"),
+            "the place: the highest one of the surface over this point, in work coordinates",
+        ),
+        key(
+            "face",
+            Kind::Whole { min: 1, max: 10_000_000 },
+            Rule("none: at must be given"),
+            "the place by the control mesh, of a layer with one: its face, counted from 1",
+        ),
+        key(
+            "corner",
+            Kind::Whole { min: 1, max: 1000 },
+            Rule("none: the face is a quadrilateral"),
+            "with face, where it is no quadrilateral: the corner, from 1, whose part is meant",
+        ),
+        key("u", PART, Number(0.5), "with face: from its first corner towards the second"),
+        key("v", PART, Number(0.5), "with face: from its first corner towards the last"),
+        key(
+            "height_mm",
+            mm(-500.0, 500.0),
+            Rule("none: the height stays free"),
+            "height that the surface gets there, above the background (as the layer's height_mm)",
+        ),
+        key(
+            "to",
+            Kind::Forms("[x, y, height], three numbers in mm"),
+            Rule("none"),
+            "move = \"xyz\" only: the point that the place moves to",
+        ),
+        key(
+            "normal",
+            Kind::Forms("[x, y, z], of any length but 0"),
+            Rule("none: the slope stays free"),
+            "normal of the surface there: [0, 0, 1] is level, [1, 0, 1] falls at 45 degrees towards +X",
+        ),
+        key(
+            "along",
+            Kind::Choice(AXES),
+            Text("u"),
+            "with heights: the iso-line through the place runs in this direction of its face",
+        ),
+        key(
+            "heights",
+            Kind::Forms("[height, height, ...], two numbers or more in mm"),
+            Rule("none"),
+            "heights of the iso-line: at the side of the face where it comes in, where it leaves it, the next face, and so on",
+        ),
+    ],
+};
+
+/// The table form of `layer.edit_rules`.
+pub(super) static EDIT_RULES: Section = Section {
+    name: "edit_rules",
+    header: "edit_rules = { ... }",
+    doc: "how the edits of a layer are solved (inside a [[layer]])",
+    keys: &[
+        key(
+            "method",
+            Kind::Choice(EDIT_METHODS),
+            Text("energy"),
+            "the change has the least thin-plate energy (a smooth, wide swell), or the least squares (local, small moves only)",
+        ),
+        key(
+            "penalty",
+            Kind::Number { min: 1.0, max: 1e8, unit: "" },
+            Rule("none: edits are met exactly"),
+            "energy only: edits give way to smoothness; an edit is missed by less the larger this is (10000: hardly)",
+        ),
+        key(
+            "rings",
+            Kind::Forms("a whole number from 1 to 1000 or \"all\""),
+            Number(4.0),
+            "how many rings of the control mesh round each edit may move; \"all\": everything",
+        ),
+        key(
+            "move",
+            Kind::Choice(MOVES),
+            Text("z"),
+            "the surface moves up and down alone, or in space",
+        ),
+        key("outline_moves", Kind::Flag, Flag(false), "the outline may move, too"),
     ],
 };
 

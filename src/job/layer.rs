@@ -7,6 +7,7 @@ use toml::de::{DeTable, DeValue};
 use super::colors;
 use super::crest::read_crests;
 use super::draft::{Draft, text_or_form};
+use super::edit::{EditsSpec, read_edits};
 use super::error::{JobError, Source, nearest, shown};
 use super::keys::{DRAWN, Key, LAYER, METHODS, PROFILES, SLOPE_CAP, SURFACE, rule};
 use super::mesh::{mesh_name, read_mesh};
@@ -200,6 +201,8 @@ fn layer(table: &Table<'_>, select: Selector, name: String) -> Result<LayerDraft
         }
         _ => {}
     }
+    let edits = read_edits(table)?;
+    check_editable(table, &select, &surface, edits.as_ref())?;
     let spec = LayerSpec {
         name,
         select,
@@ -215,8 +218,30 @@ fn layer(table: &Table<'_>, select: Selector, name: String) -> Result<LayerDraft
         smooth: read_smooth(table)?,
         union: table.flag("union"),
         visible: table.flag("visible"),
+        edits,
     };
     Ok(LayerDraft { spec, height_mm })
+}
+
+/// Edits act on meshes that Catmull and Clark's scheme refines.
+fn check_editable(
+    table: &Table<'_>,
+    select: &Selector,
+    surface: &SurfaceSpec,
+    edits: Option<&EditsSpec>,
+) -> Result<(), JobError> {
+    let edits_it = match surface {
+        SurfaceSpec::Subdivision(spec) => spec.scheme == Scheme::CatmullClark,
+        SurfaceSpec::Drawn(_) => true,
+        _ => matches!(select, Selector::Mesh(_)),
+    };
+    if edits.is_none() || edits_it {
+        return Ok(());
+    }
+    let message = format!("method \"{}\" cannot be edited", surface.method());
+    let help = "shape edits act on Catmull-Clark meshes: write surface = \"catmull-clark\" (or \"crest\" with its ridge \
+                lines, or mesh = ...) in the layer, or leave the edits out";
+    Err(table.impossible("edit", &message, "without effect", help))
 }
 
 /// How a layer or a group joins what is below it.

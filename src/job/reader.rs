@@ -68,6 +68,12 @@ impl<'a> Table<'a> {
         self.raw(name).map_or(self.span.clone(), Spanned::span)
     }
 
+    /// Where a value stands, for messages to come: `job.toml:12:1`.
+    pub(super) fn written_at(&self, name: &str) -> String {
+        let (line, column) = self.source.place(self.span_of(name).start);
+        format!("{}:{line}:{column}", self.source.file)
+    }
+
     /// `stock.width_mm`
     pub(super) fn path_of(&self, name: &str) -> String {
         if self.path.is_empty() { name.to_owned() } else { format!("{}.{name}", self.path) }

@@ -1,6 +1,7 @@
 //! Jobs that are read and settled: values, defaults, sizes. Faults and written text have files of their own.
 
 mod crests;
+mod edits;
 mod faults;
 mod meshes;
 mod written;

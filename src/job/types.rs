@@ -2,6 +2,7 @@
 //!
 //! Long because it is one vocabulary: plain types with a line on each field, and hardly any code.
 
+use super::edit::EditsSpec;
 use super::group::GroupSpec;
 use super::keys::COMBINES;
 use super::smooth::SmoothSpec;
@@ -425,6 +426,9 @@ pub struct LayerSpec {
     pub union: bool,
     /// Trims the layer to what the paint order leaves visible.
     pub visible: bool,
+    /// Shape edits of its surface, if it has some; the surface is one over a Catmull-Clark mesh then.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub edits: Option<EditsSpec>,
 }
 
 /// How a layer joins what is below it; `c` is what is below, `l` the layer.

@@ -3,12 +3,13 @@
 use std::fmt::Write as _;
 
 use super::draft::Draft;
+use super::edit::{edit_lines, rules_lines};
 use super::error::JobError;
 use super::group::{GroupSpec, users_of};
 use super::keys::{
-    ARTWORK, BACKGROUND, CONTROLS, CREST, CUTTER, FOLLOWS, Fallback, GROUP, JOB, JOINS, LAYER,
-    MACHINE, MILLINGS, OPERATION, ORIGINS, PATTERNS, PROFILES, PRUNES, RELIEF, SAFETY, SPLITS,
-    STOCK, SURFACE, Section, TOLERANCE, TOP, TRACE, TRACE_METHODS, WOOD, rule,
+    ARTWORK, BACKGROUND, CONTROLS, CREST, CUTTER, EDIT, FOLLOWS, Fallback, GROUP, JOB, JOINS,
+    LAYER, MACHINE, MILLINGS, OPERATION, ORIGINS, PATTERNS, PROFILES, PRUNES, RELIEF, SAFETY,
+    SPLITS, STOCK, SURFACE, Section, TOLERANCE, TOP, TRACE, TRACE_METHODS, WOOD, rule,
 };
 use super::library::Library;
 use super::mesh::mesh_lines;
@@ -65,11 +66,15 @@ impl Job {
             let mut lines = layer_lines(layer, self.artwork.is_picture());
             let group = self.groups.iter().find(|group| group.layers.contains(&index));
             lines.extend(group.map(|group| ("group", quoted(&group.name))));
+            lines.extend(layer.edits.as_ref().map(|e| ("edit_rules", inline(&rules_lines(e)))));
             section("[[layer]]", &lines);
             if let SurfaceSpec::Drawn(drawn) = &layer.surface {
                 for crest in &drawn.crests {
                     section(CREST.header, &crest_lines(crest));
                 }
+            }
+            for edit in layer.edits.iter().flat_map(|edits| &edits.list) {
+                section(EDIT.header, &edit_lines(edit));
             }
         }
         for group in &self.groups {

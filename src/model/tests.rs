@@ -157,7 +157,7 @@ fn what_cannot_be_carved_is_refused_with_line_column_and_cure() {
     }
     let many = model(&many, &MeshSpec { levels: Some(1), ..deep.clone() }).unwrap();
     let layer = design("[[layer]]\nmesh = \"m.obj\"\n", CUBE, None).unwrap().job.layers.remove(0);
-    let fault = many.triangles(&layer, &deep, 0.1).unwrap_err();
+    let fault = many.triangles(&layer, &deep, 0.1, &mut Vec::new()).unwrap_err();
     assert!(fault.to_string().contains("lower mesh.levels"), "{fault}");
 }
 

@@ -27,6 +27,7 @@ fn layer(select: Selector) -> LayerSpec {
         union: false,
         smooth: None,
         visible: false,
+        edits: None,
     }
 }
 

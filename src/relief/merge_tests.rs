@@ -88,6 +88,7 @@ fn flat(name: &str, z_mm: f64, combine: Combine) -> LayerSpec {
         union: false,
         smooth: None,
         visible: false,
+        edits: None,
     }
 }
 

@@ -11,11 +11,13 @@ use super::ridge::{Heights, Ridge};
 use super::rungs::{Rungs, rungs};
 use super::subdivide::{CoonsRules, PolyMesh, adaptive, limit, subdivide};
 use super::{
-    FINE, Mesh, Over, Patch, Remark, Rim, RuledFault, Segments, Surface, Way, Window, control,
-    inscribed_radius, literal, ratio, rim, ruled,
+    EditFault, FINE, Mesh, Over, Patch, Refined, Remark, Rim, RuledFault, Segments, Surface, Way,
+    Window, control, draw_to, edits, inscribed_radius, literal, ratio, rim, ruled,
 };
 use crate::geom::{Grid, Tolerance};
-use crate::job::{CrestSpec, LayerSpec, Scheme, SkeletonSpec, SubdivisionSpec, SurfaceSpec};
+use crate::job::{
+    CrestSpec, EditsSpec, LayerSpec, Scheme, SkeletonSpec, SubdivisionSpec, SurfaceSpec,
+};
 use crate::outline::{Figure, Region};
 use crate::skeleton::{
     Cells, SampleLimits, Sampled, SkeletonError, Spine, Triangulation, midlines, sample, smooth,
@@ -127,8 +129,8 @@ pub(super) fn raise(
     grid: &Grid,
     tolerance: &Tolerance,
     remarks: &mut Vec<Remark>,
-) -> Surface {
-    let raised: Vec<(Surface, Vec<Remark>)> = figure
+) -> Result<Surface, EditFault> {
+    let raised: Vec<(Result<Surface, EditFault>, Vec<Remark>)> = figure
         .regions
         .par_iter()
         .with_max_len(1)
@@ -143,10 +145,10 @@ pub(super) fn raise(
     }
     let mut parts = Vec::with_capacity(raised.len());
     for (surface, more) in raised {
-        parts.push(surface);
+        parts.push(surface?);
         remarks.extend(more);
     }
-    if parts.len() == 1 { parts.swap_remove(0) } else { Surface::Parts(parts) }
+    Ok(if parts.len() == 1 { parts.swap_remove(0) } else { Surface::Parts(parts) })
 }
 
 /// One region and all that its surface depends on.
@@ -159,14 +161,34 @@ struct Part<'a> {
 }
 
 impl Part<'_> {
-    fn raise(&self, remarks: &mut Vec<Remark>) -> Surface {
+    /// # Errors
+    /// Edits that cannot be made, those of a part without a mesh among them.
+    fn raise(&self, remarks: &mut Vec<Remark>) -> Result<Surface, EditFault> {
+        let own = edits::within(self.layer, self.region);
+        let Some((spec, first)) = self.layer.edits.as_ref().zip(own.first()) else {
+            return self.raise_with(&[], remarks);
+        };
+        let raised = self.raise_with(&own, remarks)?;
+        if matches!(raised, Surface::Field(_)) {
+            let why = match remarks.last() {
+                Some(Remark::FellBack { why, .. }) => format!("it got the ratio field: {why}"),
+                Some(Remark::NoSkeleton { why, .. }) => format!("it has no skeleton: {why}"),
+                _ => "it is too narrow, or its outline too rough".to_owned(),
+            };
+            return Err(EditFault::NoMesh { written: spec.list[*first].written.0.clone(), why });
+        }
+        Ok(raised)
+    }
+
+    /// With those of the layer's edits that lie in the region.
+    fn raise_with(&self, own: &[usize], remarks: &mut Vec<Remark>) -> Result<Surface, EditFault> {
         let Self { region, layer, crest, grid, tolerance } = *self;
         let window = Window::around(grid, &region.bounds());
         let segments = Segments::of_rings(region.rings());
         let inscribed = inscribed_radius(region, &segments, profile::RADIUS_CELLS * grid.pitch_mm);
         let narrow = profile::narrowness(region, inscribed, grid, remarks);
         if window.is_empty() || inscribed <= 0.0 {
-            return Surface::Field(Patch::empty(window));
+            return Ok(Surface::Field(Patch::empty(window)));
         }
         let cell = if narrow { grid.pitch_mm / FINE as f64 } else { grid.pitch_mm };
         let fineness = Fineness::of(cell, tolerance.chord_mm);
@@ -177,7 +199,8 @@ impl Part<'_> {
                 remarks.push(Remark::NoSkeleton { at, why });
                 let flank = Flank::of(layer, crest.profile, None);
                 let figure = Figure { source: String::new(), regions: vec![region.clone()] };
-                return Surface::Field(profile::raise(&figure, &flank, grid, &mut Vec::new()));
+                let patch = profile::raise(&figure, &flank, grid, &mut Vec::new());
+                return Ok(Surface::Field(patch));
             }
         };
         let (skeleton, calmed) = self.calmed(skeleton, &fineness, inscribed, remarks);
@@ -191,25 +214,21 @@ impl Part<'_> {
                 let over = if *ridge_true { Over::Ridge } else { Over::Control };
                 Some(skeleton.patches(&ridge, over, &fineness))
             }
-            SurfaceSpec::Subdivision(spec) => {
-                Some(skeleton.subdivided(&ridge, spec, cell).map(|raised| {
-                    let Subdivided { mesh, covered, smoothed } = raised;
-                    if covered < 1.0 - ruled::AREA {
-                        remarks.push(Remark::DrawnIn { covered });
-                    }
-                    if smoothed > 0 {
-                        remarks.push(Remark::Unfolded {
-                            part: smoothed as f64 / mesh.vertices.len() as f64,
-                        });
-                    }
-                    mesh
-                }))
-            }
+            SurfaceSpec::Subdivision(spec) => match skeleton.subdivided(&ridge, spec, cell) {
+                Ok(raised) => {
+                    raised.remark(remarks);
+                    Some(Ok(match &layer.edits {
+                        Some(edits) if !own.is_empty() => raised.drawn_to(edits, own, remarks)?,
+                        _ => raised.mesh,
+                    }))
+                }
+                Err(why) => Some(Err(why)),
+            },
             _ => None,
         };
         match mesh {
-            Some(Ok(mesh)) if narrow => return Surface::Fine(mesh),
-            Some(Ok(mesh)) => return Surface::Mesh(mesh),
+            Some(Ok(mesh)) if narrow => return Ok(Surface::Fine(mesh)),
+            Some(Ok(mesh)) => return Ok(Surface::Mesh(mesh)),
             Some(Err(why)) => remarks.push(Remark::FellBack { at, why }),
             None => {}
         }
@@ -222,7 +241,7 @@ impl Part<'_> {
             _ => ratio::field(region, spine, &heights, &ridge, grid, &window),
         };
         lower_walls(&mut patch, std::slice::from_ref(region), layer, crest, grid);
-        Surface::Field(patch)
+        Ok(Surface::Field(patch))
     }
 
     /// The skeleton of a calmer copy of a rough outline, and true, when the layer asks for insignificant branches to be
@@ -319,8 +338,9 @@ impl Skeleton {
             }
             None => subdivide(&control, spec.scheme, levels),
         };
-        let settled = fine.and_then(|fine| limit(&fine, spec.scheme));
-        let mut mesh = settled.map_err(RuledFault::Subdivision)?.to_triangles();
+        let fine = fine.and_then(|fine| limit(&fine, spec.scheme));
+        let fine = fine.map_err(RuledFault::Subdivision)?;
+        let mut mesh = fine.to_triangles();
         if spec.scheme.interpolates() && spec.scheme != Scheme::Coons {
             rim::follow(&mut mesh, &control, &self.sampled);
         }
@@ -330,7 +350,8 @@ impl Skeleton {
         if spec.scheme.interpolates() {
             ruled::check_area(covered, &self.sampled)?;
         }
-        Ok(Subdivided { mesh, covered: covered / ruled::area_of(&self.sampled), smoothed })
+        let covered = covered / ruled::area_of(&self.sampled);
+        Ok(Subdivided { mesh, covered, smoothed, control, levels, fine })
     }
 }
 
@@ -343,6 +364,38 @@ pub struct Subdivided {
     pub covered: f64,
     /// Number of vertices that were smoothed because the mesh folded over itself.
     pub smoothed: usize,
+    /// The mesh that it was refined from, and how many times.
+    control: PolyMesh,
+    levels: u32,
+    /// Its polygons, before they were cut and smoothed.
+    fine: PolyMesh,
+}
+
+impl Subdivided {
+    /// What the user should know of it.
+    fn remark(&self, remarks: &mut Vec<Remark>) {
+        if self.covered < 1.0 - ruled::AREA {
+            remarks.push(Remark::DrawnIn { covered: self.covered });
+        }
+        if self.smoothed > 0 {
+            let part = self.smoothed as f64 / self.mesh.vertices.len() as f64;
+            remarks.push(Remark::Unfolded { part });
+        }
+    }
+
+    /// The mesh drawn to those of a layer's edits that have these indices.
+    fn drawn_to(
+        self,
+        edits: &EditsSpec,
+        own: &[usize],
+        remarks: &mut Vec<Remark>,
+    ) -> Result<Mesh, EditFault> {
+        let Self { mut mesh, control, levels, mut fine, .. } = self;
+        mesh.vertices.truncate(fine.vertices.len());
+        fine.vertices = mesh.vertices;
+        draw_to(edits, own, &Refined { control: &control, levels }, &mut fine, remarks)?;
+        Ok(fine.to_triangles())
+    }
 }
 
 /// How many times a mesh is to be refined until its edges are about two cells long: as long as it does not get too

@@ -122,13 +122,13 @@ pub fn drawn_surface(
     settings: &DrawnSettings,
     remarks: &mut Vec<Remark>,
 ) -> Result<(Vec<Mesh>, Vec<Vec<DVec3>>), CrestFault> {
-    let Control { mesh, crests, flanks } = control_over(region, crests, settings)?;
-    let levels = levels(&mesh.projected(), settings.cell_mm);
-    let at = region.bounds().center();
-    let fine = flanks
-        .refined(&mesh, levels)
-        .and_then(|(fine, done)| fine.refined(levels - done)?.settled())
-        .map_err(|why| CrestFault::Mesh { at, why })?;
+    let control = control_over(region, crests, settings)?;
+    let (fine, _) = refined(&control, region, settings)?;
+    Ok((upright(&fine, remarks), control.crests))
+}
+
+/// The refined mesh in triangles, those turned over by themselves.
+fn upright(fine: &PolyMesh, remarks: &mut Vec<Remark>) -> Vec<Mesh> {
     let mut mesh = fine.to_triangles();
     let folds = mesh.take_folds();
     let first = folds.faces.first().map(|f| folds.vertices[f[0] as usize].truncate());
@@ -137,7 +137,24 @@ pub fn drawn_surface(
         remarks.push(Remark::Folded { count: folds.faces.len(), at });
         meshes.push(folds);
     }
-    Ok((meshes, crests))
+    meshes
+}
+
+/// The mesh refined as finely as its grid shows, and how many times that was.
+fn refined(
+    control: &Control,
+    region: &Region,
+    settings: &DrawnSettings,
+) -> Result<(PolyMesh, u32), CrestFault> {
+    let levels = levels(&control.mesh.projected(), settings.cell_mm);
+    let at = region.bounds().center();
+    let fine = control
+        .flanks
+        .clone()
+        .refined(&control.mesh, levels)
+        .and_then(|(fine, done)| fine.refined(levels - done)?.settled())
+        .map_err(|why| CrestFault::Mesh { at, why })?;
+    Ok((fine, levels))
 }
 
 /// How many times a mesh is refined until its edges are as short as a cell, as long as it does not get too large.

@@ -291,6 +291,7 @@ pub(super) fn raise_region(
         union: false,
         smooth: None,
         visible: false,
+        edits: None,
     };
     let grid = Grid::covering(DVec2::ZERO, 12.0, 12.0, 0.15).unwrap();
     let raised = raise_all(&outlines, &[spec], &grid, &Tolerance::default()).unwrap();

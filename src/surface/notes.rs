@@ -2,7 +2,7 @@
 
 use super::Remark;
 use crate::geom::DVec2;
-use crate::job::LayerSpec;
+use crate::job::{EditMethod, LayerSpec};
 use std::collections::BTreeMap;
 
 /// Counts the remarks on one layer, each with the source of its figure, up into notes.
@@ -39,6 +39,9 @@ fn rank(remark: &Remark) -> (usize, f64) {
         Remark::Rough { ripples, calmed: false, .. } => (10, -(ripples as f64)),
         Remark::Rough { ripples, .. } => (11, -(ripples as f64)),
         Remark::Folded { count, .. } => (12, -(count as f64)),
+        // Each edit is told by itself.
+        Remark::EditMissed { edit, .. } => (13 + 2 * edit, 0.0),
+        Remark::EditFolded { edit, .. } => (14 + 2 * edit, 0.0),
     }
 }
 
@@ -56,7 +59,34 @@ impl Worst<'_> {
         let Self { count: n, source, .. } = *self;
         let (method, height_mm) = (layer.surface.method(), layer.height_mm);
         let place = |at: DVec2| format!("{source}, at {:.1}, {:.1}", at.x, at.y);
+        let edits = layer.edits.as_ref();
+        let edit = |k: usize| {
+            let written = edits.and_then(|edits| edits.list.get(k)).map_or("", |e| &e.written.0);
+            format!("edit {} ({written})", k + 1)
+        };
         match self.remark {
+            Remark::EditMissed { edit: k, by_mm, by_rad } => {
+                let penalty = edits.is_some_and(|edits| {
+                    matches!(edits.method, EditMethod::Energy { penalty: Some(_) })
+                });
+                let why = if penalty {
+                    "its penalty allows that, a larger one less"
+                } else {
+                    "it contradicts another edit, or what is held: move it, or raise edit_rules.rings"
+                };
+                format!(
+                    "{} is missed by {by_mm:.3} mm and {:.2} degrees; {why}",
+                    edit(k),
+                    by_rad.to_degrees()
+                )
+            }
+            Remark::EditFolded { edit: k, at } => format!(
+                "{} makes the surface fold over itself, seen from above, at {:.1}, {:.1}; the highest part counts there; \
+                 move it by less, or free more rings",
+                edit(k),
+                at.x,
+                at.y
+            ),
             Remark::TooNarrow { width_mm, at } => format!(
                 "{n} part(s) are narrower than one cell of the grid and cannot be carved true to shape; the thinnest is \
                  {width_mm:.3} mm wide ({}); set relief.pitch_mm below {:.3} (now {pitch_mm}) or widen the artwork",

@@ -21,6 +21,7 @@ fn layer(base_mm: f64, height_mm: f64, profile: Profile, radius_mm: Option<f64>)
         union: false,
         smooth: None,
         visible: false,
+        edits: None,
     }
 }
 

@@ -31,7 +31,7 @@ pub use creased::{CreasedMesh, SHARP};
 pub use edit::{Edit, EditError, EditRules, Edited, Method, Spot, edit};
 pub use evaluate::{EvaluateError, LimitSurface, Sample};
 pub use iso::{IsoFault, iso_line};
-pub use masks::{LimitRows, limit_rows};
+pub use masks::{LimitRows, SparseRow, limit_rows};
 pub use spaced::SpacedMesh;
 pub use topology::Topology;
 
@@ -99,6 +99,14 @@ impl PolyMesh {
     /// The faces by their vertices.
     pub fn faces(&self) -> impl ExactSizeIterator<Item = &[u32]> {
         self.start.windows(2).map(|s| &self.loops[s[0] as usize..s[1] as usize])
+    }
+
+    /// The vertices of a face.
+    ///
+    /// # Panics
+    /// There is no such face.
+    pub fn face(&self, face: usize) -> &[u32] {
+        &self.loops[self.start[face] as usize..self.start[face + 1] as usize]
     }
 
     /// The mesh in triangles: a quadrilateral is cut by the diagonal that turns no triangle over (the shorter

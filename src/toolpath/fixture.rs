@@ -39,6 +39,7 @@ pub(crate) fn job(
         union: false,
         smooth: None,
         visible: false,
+        edits: None,
     };
     Job {
         title: "Test".into(),

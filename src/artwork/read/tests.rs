@@ -358,6 +358,7 @@ mod placing {
             union: false,
             smooth: None,
             visible: false,
+            edits: None,
         }
     }
 

@@ -1,10 +1,12 @@
 //! A figure and the crests of its layer -> its surface.
 
-use super::{Course, CrestFault, DrawnCrest, DrawnSettings, drawn_path, drawn_surface};
+use super::{
+    Course, CrestFault, DrawnCrest, DrawnSettings, control_over, drawn_path, refined, upright,
+};
 use crate::geom::{DVec2, DVec3, Grid, Tolerance};
 use crate::job::{CourseSpec, DrawnSpec, LayerSpec, SurfaceSpec};
 use crate::outline::{Figure, OutlineLayer, RidgePath};
-use crate::surface::{Remark, Surface};
+use crate::surface::{Refined, Remark, Surface, SurfaceError, draw_to, edits};
 
 /// What a surface over drawn crests depends on.
 #[derive(Debug, Clone, Copy)]
@@ -20,12 +22,12 @@ pub(in crate::surface) struct Over<'a> {
 /// Raises every region of a figure over the crests that lie in it.
 ///
 /// # Errors
-/// [`CrestFault`]: a region without a crest, or crests that cannot be held.
+/// [`SurfaceError`]: a region without a crest, crests that cannot be held, or edits that cannot be made.
 pub(in crate::surface) fn raise(
     figure: &Figure,
     over: &Over<'_>,
     remarks: &mut Vec<Remark>,
-) -> Result<Surface, CrestFault> {
+) -> Result<Surface, SurfaceError> {
     let Over { layer, spec, ridges, grid, tolerance } = *over;
     let crests = crests(layer, spec, ridges);
     let settings = DrawnSettings {
@@ -41,11 +43,19 @@ pub(in crate::surface) fn raise(
     for region in &figure.regions {
         let own: Vec<DrawnCrest> =
             crests.iter().filter(|c| region.contains(middle(c))).cloned().collect();
+        let crest = |fault| SurfaceError::Crest { layer: layer.name.clone(), fault };
         if own.is_empty() {
-            return Err(CrestFault::NoCrest { at: region.bounds().center() });
+            return Err(crest(CrestFault::NoCrest { at: region.bounds().center() }));
         }
-        let (meshes, _) = drawn_surface(region, &own, &settings, remarks)?;
-        parts.extend(meshes.into_iter().map(Surface::Mesh));
+        let control = control_over(region, &own, &settings).map_err(crest)?;
+        let (mut fine, levels) = refined(&control, region, &settings).map_err(crest)?;
+        if let Some(spec) = &layer.edits {
+            let mesh = control.mesh.projected();
+            let from = Refined { control: &mesh, levels };
+            draw_to(spec, &edits::within(layer, region), &from, &mut fine, remarks)
+                .map_err(|fault| SurfaceError::Edit { layer: layer.name.clone(), fault })?;
+        }
+        parts.extend(upright(&fine, remarks).into_iter().map(Surface::Mesh));
     }
     Ok(if parts.len() == 1 { parts.swap_remove(0) } else { Surface::Parts(parts) })
 }

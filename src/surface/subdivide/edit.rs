@@ -14,6 +14,7 @@ mod locate;
 
 use self::dense::Symmetric;
 use self::factor::Factor;
+use super::masks::SparseRow;
 use super::{EvaluateError, LimitSurface, Sample, SubdivideError, Topology};
 use crate::geom::{DVec2, DVec3};
 
@@ -49,8 +50,21 @@ pub enum Edit {
         /// The normal.
         normal: Option<DVec3>,
     },
+    /// The same at a place of a surface that is not the mesh's own limit, but gets the limit of the displacement added.
+    Over {
+        /// The face of the control mesh that the place belongs to.
+        face: usize,
+        /// The displacement there, as weights of those of the vertices.
+        row: SparseRow,
+        /// Two tangents of the surface there as it is, of about unit length, and what of the displacement is added to each.
+        tangents: [(SparseRow, DVec3); 2],
+        /// The displacement that is wanted, mm.
+        by: Option<DVec3>,
+        /// The normal.
+        normal: Option<DVec3>,
+    },
     /// Each of these rows of weights over the vertices moves by its displacement, mm: control points of an iso-line.
-    Rows(Vec<(Vec<(u32, f64)>, DVec3)>),
+    Rows(Vec<(SparseRow, DVec3)>),
 }
 
 /// What is least about the displacement.
@@ -238,7 +252,7 @@ pub fn edit(
         };
     }
     let after: Vec<DVec3> = points.iter().zip(&moved).map(|(p, d)| *p + *d).collect();
-    let flipped = flipped(surface, edits, &after)?;
+    let flipped = flipped(surface, edits, &moved)?;
     let folded = if rules.in_space { folded(surface, edits, &moved, &after) } else { Vec::new() };
     Ok(Edited { moved, residual, flipped, folded })
 }
@@ -274,40 +288,66 @@ fn add_conditions(
                 place(row, *by);
             }
         }
-        Edit::Point { at, by, normal } => {
-            let sample = sample(surface, edit, at)?;
-            let row = |parts: &[f64]| -> Vec<(u32, f64)> {
-                sample.vertices.iter().copied().zip(parts.iter().copied()).collect()
-            };
+        Edit::Point { by, normal, .. } | Edit::Over { by, normal, .. } => {
+            let Rows { point, tangents } = rows_of(surface, edit, what)?;
             if let Some(by) = by {
                 if !by.is_finite() {
                     return Err(EditError::Number { edit });
                 }
-                place(&row(&sample.point), *by);
+                place(&point, *by);
             }
             let Some(normal) = normal else { return Ok(()) };
             let unit = normal.try_normalize().ok_or(EditError::Number { edit })?;
-            if sample.tangents.iter().any(Vec::is_empty) {
+            if tangents.iter().any(|(row, _)| row.is_empty()) {
                 return Err(EditError::NoNormal { edit });
             }
             if !in_space && unit.z.abs() <= LEAST_RISE {
                 return Err(EditError::Steep { edit });
             }
-            for tangent in &sample.tangents {
-                let terms = row(tangent).into_iter().map(|(v, part)| (v, unit * part)).collect();
-                let value = -sample.apply(tangent, points).dot(unit);
-                out.push(Condition { edit, terms, value });
+            for (row, now) in tangents {
+                let terms = row.into_iter().map(|(v, part)| (v, unit * part)).collect();
+                out.push(Condition { edit, terms, value: -now.dot(unit) });
             }
         }
     }
     Ok(())
 }
 
+/// The place of an edit: its point as weights of the vertices, and two tangents, each as weights and as it is.
+struct Rows {
+    point: SparseRow,
+    tangents: [(SparseRow, DVec3); 2],
+}
+
+fn rows_of(surface: &LimitSurface, edit: usize, what: &Edit) -> Result<Rows, EditError> {
+    let points = &surface.mesh().vertices;
+    match what {
+        Edit::Point { at, .. } => {
+            let sample = sample(surface, edit, at)?;
+            let row = |parts: &[f64]| -> SparseRow {
+                sample.vertices.iter().copied().zip(parts.iter().copied()).collect()
+            };
+            let tangents = [0, 1].map(|k| &sample.tangents[k]);
+            let tangents = tangents.map(|parts| (row(parts), sample.apply(parts, points)));
+            Ok(Rows { point: row(&sample.point), tangents })
+        }
+        Edit::Over { row, tangents, .. } => {
+            let known = |row: &SparseRow| row.iter().all(|r| (r.0 as usize) < points.len());
+            if known(row) && tangents.iter().all(|(row, now)| known(row) && now.is_finite()) {
+                Ok(Rows { point: row.clone(), tangents: tangents.clone() })
+            } else {
+                Err(EditError::Number { edit })
+            }
+        }
+        Edit::Rows(_) => Ok(Rows { point: SparseRow::new(), tangents: Default::default() }),
+    }
+}
+
 /// The vertices that an edit starts from.
 fn seeds(surface: &LimitSurface, edit: &Edit) -> Vec<u32> {
     match edit {
-        Edit::Point { at, .. } => {
-            surface.mesh().faces().nth(at.face).map_or(Vec::new(), <[u32]>::to_vec)
+        Edit::Point { at: Spot { face, .. }, .. } | Edit::Over { face, .. } => {
+            surface.mesh().faces().nth(*face).map_or(Vec::new(), <[u32]>::to_vec)
         }
         Edit::Rows(rows) => rows.iter().flat_map(|(row, _)| row.iter().map(|r| r.0)).collect(),
     }
@@ -345,13 +385,17 @@ fn free(
 fn flipped(
     surface: &LimitSurface,
     edits: &[Edit],
-    after: &[DVec3],
+    moved: &[DVec3],
 ) -> Result<Vec<usize>, EditError> {
     let mut out = Vec::new();
     for (k, edit) in edits.iter().enumerate() {
-        if let Edit::Point { at, normal: Some(normal), .. } = edit {
-            let found = sample(surface, k, at)?.normal(after);
-            if !found.is_some_and(|found| found.dot(*normal) > 0.0) {
+        if let Edit::Point { normal: Some(normal), .. } | Edit::Over { normal: Some(normal), .. } =
+            edit
+        {
+            let [a, b] = rows_of(surface, k, edit)?.tangents.map(|(row, now)| {
+                now + row.iter().map(|&(v, part)| moved[v as usize] * part).sum::<DVec3>()
+            });
+            if a.cross(b).dot(*normal) <= 0.0 {
                 out.push(k);
             }
         }

@@ -9,7 +9,7 @@ use super::{PolyMesh, Topology};
 use std::f64::consts::{PI, TAU};
 
 /// Weights over vertices; those of tangents sum up to 0.
-pub(super) type SparseRow = Vec<(u32, f64)>;
+pub type SparseRow = Vec<(u32, f64)>;
 
 /// What a vertex comes to, as rows of weights over the vertices of its mesh.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,0 +1,168 @@
+//! `relievo edit JOB`: what the shape edits of a job do to its relief, without toolpaths.
+
+use super::files::{EarlierPrograms, Outputs};
+use super::observe::{self, Stages};
+use super::{Stop, inputs, outcome};
+use crate::geom::{DVec2, Heightfield};
+use crate::job::{EditPlace, EditTarget, Job};
+use crate::report::{Look, change_png, shaded_png};
+use crate::{Design, design_of};
+use std::path::{Path, PathBuf};
+
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:
+  relievo edit scroll.toml                   before.png, after.png and change.png in scroll-edit/
+  relievo edit scroll.toml --pitch 0.4       the same in a moment, less fine")]
+pub(super) struct Args {
+    /// A job file (.toml) with [[layer.edit]] in one of its layers
+    input: PathBuf,
+
+    /// Distance of the heightfield's nodes (default: the job's)
+    #[arg(long, value_name = "MM", value_parser = super::surfaces::length)]
+    pitch: Option<f64>,
+
+    /// Folder for the outputs (default: NAME-edit beside the input)
+    #[arg(long, value_name = "FOLDER")]
+    out: Option<PathBuf>,
+
+    /// Print how long each stage took
+    #[arg(long)]
+    timings: bool,
+
+    /// Print the result as JSON
+    #[arg(long)]
+    json: bool,
+
+    /// Print nothing when all goes well
+    #[arg(long)]
+    quiet: bool,
+}
+
+/// What became of one edit, in the relief.
+#[derive(Debug, serde::Serialize)]
+struct Done {
+    /// Its number among all edits of the job, from 1: as on the change map.
+    number: usize,
+    layer: String,
+    written: String,
+    /// x and y in work coordinates, mm; none for a place by its face.
+    at: Option<DVec2>,
+    /// Height above the background that was asked for, mm.
+    wanted_mm: Option<f64>,
+    /// Height of the relief there above the background, mm.
+    before_mm: Option<f64>,
+    after_mm: Option<f64>,
+}
+
+pub(super) fn run(args: &Args) -> Result<(), Stop> {
+    let stages = Stages::new(args.quiet);
+    stages.enter("read");
+    let input = inputs::load(&args.input)?;
+    let folder = args.out.clone().unwrap_or_else(|| default_folder(&args.input));
+    let found = input.found();
+    let mut job = input.draft.without_travel_limits().settle(&found)?;
+    if job.layers.iter().all(|layer| layer.edits.is_none()) {
+        return Err(Stop::Refused(anyhow::anyhow!(
+            "{} has no shape edits; below a [[layer]] with surface = \"catmull-clark\", \"crest\" or a mesh write\n  \
+             [[layer.edit]]\n  at = [40, 30]\n  height_mm = 5",
+            args.input.display()
+        )));
+    }
+    if let Some(pitch_mm) = args.pitch {
+        job.relief.pitch_mm = pitch_mm;
+    }
+    let mut outputs = Outputs::prepare(&folder)?;
+    let raise = |job: Job| {
+        design_of(job, &input.artwork, &input.models, &mut |stage| stages.enter(stage))
+            .map_err(|e| outcome::with_file(e, &input.artwork_file))
+    };
+    let mut plain = job.clone();
+    plain.layers.iter_mut().for_each(|layer| layer.edits = None);
+    let (before, after) = (raise(plain)?, raise(job)?);
+    stages.enter("pictures");
+    let (old, new) = (&before.relief.target, &after.relief.target);
+    let done = done(&after, old);
+    let marks: Vec<(usize, DVec2)> = done.iter().filter_map(|d| Some((d.number, d.at?))).collect();
+    let (job, title) = (&after.job, &after.job.title);
+    let wood = Look::of_wood(&job.stock.wood.name, job.stock.grain_rad);
+    outputs.add("before.png", &shaded_png(old, wood, Some(&format!("{title}: before")))?)?;
+    outputs.add("after.png", &shaded_png(new, wood, Some(&format!("{title}: after")))?)?;
+    outputs.add("change.png", &change_png(old, new, &marks, &format!("{title}: the change"))?)?;
+    stages.enter("write");
+    outputs.commit(EarlierPrograms::Keep)?;
+    let timings = stages.finish();
+    if args.json {
+        let all = serde_json::json!({
+            "title": title, "folder": folder, "pitch_mm": job.relief.pitch_mm, "edits": done, "notes": after.notes,
+        });
+        observe::say(&serde_json::to_string_pretty(&all)?)?;
+    } else if !args.quiet {
+        for note in &after.notes {
+            observe::complain(&format!("note: {note}"));
+        }
+        observe::say(&table(&done))?;
+        observe::say(&format!("written to {}", folder.display()))?;
+    }
+    if args.timings {
+        observe::complain(&timings);
+    }
+    Ok(())
+}
+
+/// All edits, and what the relief is like at their places.
+fn done(after: &Design, before: &Heightfield) -> Vec<Done> {
+    let job = &after.job;
+    let above = |field: &Heightfield, at| field.height_at(at).map(|z| z + job.relief.depth_mm);
+    let all = job.layers.iter().flat_map(|layer| {
+        layer.edits.iter().flat_map(|edits| &edits.list).map(move |edit| (layer, edit))
+    });
+    let mut done: Vec<Done> = Vec::new();
+    for (layer, edit) in all {
+        let (at, wanted_mm) = match (edit.at, &edit.target) {
+            (_, EditTarget::Point(to)) => (Some(to.truncate()), Some(to.z)),
+            (EditPlace::Plan(at), EditTarget::Height(height)) => (Some(at), Some(*height)),
+            (EditPlace::Plan(at), _) => (Some(at), None),
+            (EditPlace::Mesh { .. }, EditTarget::Height(height)) => (None, Some(*height)),
+            (EditPlace::Mesh { .. }, _) => (None, None),
+        };
+        done.push(Done {
+            number: done.len() + 1,
+            layer: layer.name.clone(),
+            written: edit.written.0.clone(),
+            at,
+            wanted_mm: wanted_mm.map(|height| height + layer.offset_mm),
+            before_mm: at.and_then(|at| above(before, at)),
+            after_mm: at.and_then(|at| above(&after.relief.target, at)),
+        });
+    }
+    done
+}
+
+/// The edits, a line each.
+fn table(done: &[Done]) -> String {
+    let mm = |v: Option<f64>| v.map_or("-".to_owned(), |v| format!("{v:.3}"));
+    let mut text = String::from(
+        "edit   at x      at y    wanted    before     after  (mm above the background)",
+    );
+    for d in done {
+        let [x, y] = d.at.map_or(["-".to_owned(), "-".to_owned()], |at| {
+            at.to_array().map(|v| format!("{v:.2}"))
+        });
+        text += &format!(
+            "\n{:>4} {x:>8} {y:>9} {:>9} {:>9} {:>9}  layer '{}', {}",
+            d.number,
+            mm(d.wanted_mm),
+            mm(d.before_mm),
+            mm(d.after_mm),
+            d.layer,
+            d.written
+        );
+    }
+    text
+}
+
+/// `dir/rose.toml` -> `dir/rose-edit`.
+fn default_folder(input: &Path) -> PathBuf {
+    let stem = input.file_stem().unwrap_or_default().to_string_lossy();
+    input.with_file_name(format!("{stem}-edit"))
+}
