@@ -56,8 +56,8 @@ pub use rungs::{Rungs, rungs};
 pub use subdivide::{
     ClosedForm, CoonsMesh, CoonsRules, CreasedMesh, Edit, EditError, EditRules, Edited,
     EvaluateError, Handle, IsoFault, LimitRows, LimitSurface, MOST_FACES, Method, PolyMesh, SHARP,
-    Sample, SpacedMesh, SparseRow, Spot, SubdivideError, Topology, adaptive, coons, edit, iso_line,
-    limit, limit_rows, subdivide,
+    Sample, SpacedMesh, SparseRow, Spot, SubdivideError, Topology, Triangles, adaptive, coons,
+    edit, iso_line, limit, limit_rows, subdivide,
 };
 
 use crate::geom::{Bounds, Grid, Tolerance};

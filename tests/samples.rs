@@ -122,6 +122,11 @@ fn shell_carves() {
 }
 
 #[test]
+fn medallion_carves() {
+    carve(&samples().into_iter().find(|s| name(s) == "medallion").unwrap());
+}
+
+#[test]
 fn tiger_carves() {
     carve(&samples().into_iter().find(|s| name(s) == "tiger").unwrap());
 }

@@ -4,10 +4,12 @@
 
 mod shapes;
 
+use relievo::artwork::{Fonts, read_svg};
 use relievo::compare::tables::{
     CREASES, FINE, Method, Outline, Raised, Shape, crease, shapes, summary,
 };
-use relievo::geom::DVec2;
+use relievo::geom::{DVec2, contains_even_odd};
+use relievo::job::{Control, CrestSpec, Draft, Library, Scheme, SubdivisionSpec};
 use relievo::outline::Region;
 use shapes::Ladder;
 
@@ -123,8 +125,6 @@ fn rungs_are_even_and_symmetric() {
 
 /// The relief of a job over an ellipse of 60 x 40 mm, and what was to be said.
 fn relief_of(layer: &str) -> relievo::Design {
-    use relievo::artwork::{Fonts, read_svg};
-    use relievo::job::{Draft, Library};
     let job = format!(
         "[artwork]\nfile = \"a.svg\"\n[stock]\nwidth_mm = 80\nheight_mm = 60\nthickness_mm = 20\n[relief]\npitch_mm = 0.1\n\
          depth_mm = 9\n[[layer]]\nselect = \"all\"\n{layer}"
@@ -179,5 +179,124 @@ fn edits_hold_in_the_heightfield_up_to_the_bend_within_two_cells() {
                 assert!(off < 0.1, "{keys}: {off}");
             }
         }
+    }
+}
+
+/// Coons surfaces over the eight shapes: no part of any of them folds, with a draft or without, steep or gentle.
+#[test]
+fn coons_surfaces_fold_over_none_of_the_shapes() {
+    for shape in shapes(FINE) {
+        let raised = Raised::new(&shape, Outline::Own, f64::INFINITY, 0.1);
+        for (draft_rad, height_mm) in [(None, 1.0), (Some(0.5), 1.0), (Some(0.5), 0.2)] {
+            let spec = SubdivisionSpec {
+                scheme: Scheme::Coons,
+                levels: Some(4),
+                adaptive_mm: None,
+                draft_rad,
+                control: Control::Quads,
+                crest: CrestSpec::default(),
+            };
+            let mut ridge = raised.ridge.clone();
+            ridge.height_mm = height_mm;
+            let got = raised.skeleton.subdivided(&ridge, &spec, 0.1);
+            let got = got.unwrap_or_else(|why| panic!("{} {draft_rad:?}: {why}", shape.name));
+            assert_eq!(got.smoothed, 0, "{} {draft_rad:?} {height_mm}", shape.name);
+            let top = got.mesh.vertices.iter().map(|v| v.z).fold(0.0, f64::max);
+            assert_eq!(top, height_mm, "{}", shape.name);
+        }
+    }
+}
+
+/// Slopes of the merged heightfield along the whole outline of a figure, degrees, each over a millimetre of it: the cubic
+/// from the outline on that lies nearest to the heights of the nodes from one cell to seven cells inside.
+fn slopes_at_outline(figure: &str, draft_deg: f64) -> Vec<f64> {
+    let (pitch_mm, depth_mm) = (0.15, 8.0);
+    let job = format!(
+        "machine = \"shapeoko3\"\n[stock]\nthickness_mm = 18\nwood = \"beech\"\n[artwork]\nfile = \"a.svg\"\n\
+         [relief]\npitch_mm = {pitch_mm}\ndepth_mm = {depth_mm}\nbackground = {{ leave_mm = 8 }}\n\
+         [[layer]]\nselect = \"all\"\nheight_mm = 2\nsurface = {{ method = \"coons\", draft_deg = {draft_deg} }}\n\
+         [[operation]]\nkind = \"rough\"\ncutter = \"flat-6\"\nleave_mm = 0.4\n\
+         [[operation]]\nkind = \"finish\"\ncutter = \"ball-3\"\nscallop_mm = 0.02\n"
+    );
+    let svg = format!(
+        "<svg xmlns='http://www.w3.org/2000/svg' width='24mm' height='24mm' viewBox='-12 -12 24 24'>{figure}</svg>"
+    );
+    let none = |_: &str| Err(std::io::ErrorKind::NotFound.into());
+    let draft =
+        Draft::from_toml(&job, "job.toml", &Library::built_in(), &none).expect("a sound job");
+    let artwork = read_svg(svg.as_bytes(), &Fonts::none()).expect("a sound drawing");
+    let design = relievo::design(draft, &artwork, &[], &mut |_| ()).expect("it can be carved");
+    assert!(!design.notes.iter().any(|n| n.contains("ratio")), "{:?}", design.notes);
+    let region = &design.outlines.layers[0].figures[0].regions[0];
+    let target = &design.relief.target;
+    let grid = target.grid();
+    // By ring and millimetre: the distances of nodes and their heights.
+    let mut places = std::collections::BTreeMap::<(usize, u32), Vec<[f64; 2]>>::new();
+    for (i, j) in (0..grid.nx).flat_map(|i| (0..grid.ny).map(move |j| (i, j))) {
+        let p = grid.node(i, j);
+        if !contains_even_odd(region.rings(), p) {
+            continue;
+        }
+        let mut nearest = (f64::INFINITY, (0, 0));
+        for (r, ring) in region.rings().enumerate() {
+            let mut length = 0.0;
+            for (&a, &b) in ring.iter().zip(ring.iter().cycle().skip(1)) {
+                let edge = b - a;
+                let t = ((p - a).dot(edge) / edge.length_squared()).clamp(0.0, 1.0);
+                let far = p.distance(a + edge * t);
+                if far < nearest.0 {
+                    nearest = (far, (r, (length + t * edge.length()) as u32));
+                }
+                length += edge.length();
+            }
+        }
+        if (pitch_mm..7.0 * pitch_mm).contains(&nearest.0) {
+            let height = f64::from(target.at(i, j)) + depth_mm;
+            places.entry(nearest.1).or_default().push([nearest.0, height]);
+        }
+    }
+    places.values().filter(|nodes| nodes.len() > 20).map(|nodes| slope(nodes)).collect()
+}
+
+/// The slope at 0 of the least squares cubic through 0, degrees.
+fn slope(points: &[[f64; 2]]) -> f64 {
+    let mut rows = [[0.0; 4]; 3];
+    for &[d, z] in points {
+        let powers = [d, d * d, d * d * d];
+        for (row, power) in rows.iter_mut().zip(powers) {
+            for (sum, value) in row.iter_mut().zip([powers[0], powers[1], powers[2], z]) {
+                *sum += power * value;
+            }
+        }
+    }
+    for k in 0..3 {
+        let pivot = rows[k];
+        for (_, row) in rows.iter_mut().enumerate().filter(|(i, _)| *i != k) {
+            let part = row[k] / pivot[k];
+            row.iter_mut().zip(pivot).for_each(|(value, pivot)| *value -= part * pivot);
+        }
+    }
+    libm::atan(rows[0][3] / rows[0][0]).to_degrees()
+}
+
+/// In the merged heightfield, too, the surface leaves the whole outline at its draft, within 0.6 degrees.
+#[test]
+fn coons_surfaces_keep_their_draft_in_the_heightfield() {
+    for (name, draft_deg, figure) in [
+        ("oval", 30.0, "<ellipse rx='11' ry='8'/>"),
+        ("disc", 20.0, "<circle r='9'/>"),
+        (
+            "ring",
+            20.0,
+            "<path fill-rule='evenodd' d='M11,0A11,11 0 1 1 -11,0A11,11 0 1 1 11,0Z M4,0A4,4 0 1 1 -4,0A4,4 0 1 1 4,0Z'/>",
+        ),
+        ("rounded rectangle", 30.0, "<rect x='-11' y='-8' width='22' height='16' rx='4'/>"),
+    ] {
+        let slopes = slopes_at_outline(figure, draft_deg);
+        let low = slopes.iter().copied().fold(f64::INFINITY, f64::min);
+        let high = slopes.iter().copied().fold(0.0, f64::max);
+        println!("{name}, {draft_deg} degrees: {low:.2} to {high:.2}, {} places", slopes.len());
+        assert!(slopes.len() > 50, "{name}: {} places", slopes.len());
+        assert!(low > draft_deg - 0.6 && high < draft_deg + 0.6, "{name}: {low} to {high}");
     }
 }

@@ -13,6 +13,10 @@
 //! valence 6 on the ridge and 4 on the outline. Nothing has a vertex on an edge of a neighbour: both sides of an inner
 //! edge cut it in the same point.
 
+mod spokes;
+
+pub(super) use spokes::{Spoked, spokes};
+
 use super::crest::Crest;
 use super::{PolyMesh, Ridge, Rungs, rungs};
 use crate::geom::DVec2;
@@ -74,7 +78,7 @@ pub fn control(
             }
         }
     }
-    build.finish()
+    build.finish().0
 }
 
 /// The inner edges of a run that count, as rungs.
@@ -231,10 +235,17 @@ impl<'a> Build<'a> {
         }
     }
 
-    /// A run rebuilt on rungs; `line` holds the heights of their middles.
-    fn even(&mut self, run: &Run, rungs: &Rungs, line: &[f64], quads: bool) {
-        let n = rungs.left.len().min(rungs.right.len()).min(line.len());
-        let (Some(&first), Some(&last)) = (run.edges.first(), run.edges.last()) else { return };
+    /// The vertices at the feet of the first `n` rungs of a run, left and right, and those on the crest.
+    fn spoked(
+        &mut self,
+        run: &Run,
+        rungs: &Rungs,
+        heights: &[f64],
+        n: usize,
+    ) -> ([Vec<u32>; 2], Vec<u32>) {
+        let (Some(&first), Some(&last)) = (run.edges.first(), run.edges.last()) else {
+            return ([Vec::new(), Vec::new()], Vec::new());
+        };
         let feet = [0, 1].map(|side| {
             let points = if side == 0 { &rungs.left[..n] } else { &rungs.right[..n] };
             let ends =
@@ -243,15 +254,24 @@ impl<'a> Build<'a> {
         });
         let crest: Vec<u32> = (0..n)
             .map(|j| match j {
-                0 if !run.closed => self.middle(first[0], first[1], line[j]),
-                _ if j + 1 == n && !run.closed => self.middle(last[0], last[1], line[j]),
+                0 if !run.closed => self.middle(first[0], first[1], heights[j]),
+                _ if j + 1 == n && !run.closed => self.middle(last[0], last[1], heights[j]),
                 _ => {
                     let at = (rungs.left[j] + rungs.right[j]) * 0.5;
-                    self.mesh.add_vertex(at.extend(line[j]), false)
+                    self.mesh.add_vertex(at.extend(heights[j]), false)
                 }
             })
             .collect();
-        let [left, right] = feet;
+        (feet, crest)
+    }
+
+    /// A run rebuilt on rungs; `line` holds the heights of their middles.
+    fn even(&mut self, run: &Run, rungs: &Rungs, line: &[f64], quads: bool) {
+        let n = rungs.left.len().min(rungs.right.len()).min(line.len());
+        if run.edges.is_empty() {
+            return;
+        }
+        let ([left, right], crest) = self.spoked(run, rungs, line, n);
         for j in 0..if run.closed { n } else { n.saturating_sub(1) } {
             let k = (j + 1) % n;
             if quads {
@@ -312,8 +332,8 @@ impl<'a> Build<'a> {
         feet
     }
 
-    /// The mesh without the vertices that no face uses.
-    fn finish(self) -> PolyMesh {
+    /// The mesh without the vertices that no face uses, and where each is now.
+    fn finish(self) -> (PolyMesh, Vec<Option<u32>>) {
         let mut place = vec![None; self.mesh.vertices.len()];
         let mut out = PolyMesh::new();
         let mut face = Vec::new();
@@ -328,7 +348,7 @@ impl<'a> Build<'a> {
             }
             out.add_face(&face);
         }
-        out
+        (out, place)
     }
 }
 

@@ -191,6 +191,44 @@ fn polar(radii: &[f64], way: f64) -> Ring {
     radii.iter().enumerate().map(at).collect()
 }
 
+/// Spokes: in each vertex of an outline at least three edges meet, three in nearly all; faces are quadrilaterals and sectors
+/// with their pole on the crest or on an outline.
+#[test]
+fn spokes_lead_from_every_vertex_of_the_outline() {
+    for rings in [bar(), hexring2()] {
+        let (s, c) = taken_apart(&rings, &half_disc());
+        let spoked = spokes(&s, &c, &ridge(rings.len()));
+        let topology = Topology::of(&spoked.mesh).unwrap();
+        let (mut ring, mut outer, mut three) = (Vec::new(), 0, 0);
+        for v in 0..spoked.mesh.vertices.len() as u32 {
+            topology.ring(v, &mut ring);
+            let z = spoked.mesh.vertices[v as usize].z;
+            if topology.is_boundary(v) {
+                assert!(ring.len() >= 3 && z == 0.0, "{} edges", ring.len());
+                outer += 1;
+                three += usize::from(ring.len() == 3);
+            } else {
+                assert!(z > 0.0);
+            }
+        }
+        assert!(5 * three > 4 * outer, "{three} of {outer}");
+        for face in spoked.mesh.faces() {
+            assert!(face.len() == 3 || face.len() == 4);
+            let edges = face.iter().zip(face.iter().cycle().skip(1));
+            let on_rim =
+                edges.filter(|&(&a, &b)| topology.is_boundary(a) && topology.is_boundary(b));
+            assert!(on_rim.count() <= 1);
+            if let [pole, a, b] = *face {
+                assert_eq!(topology.is_boundary(a), topology.is_boundary(b));
+                assert_ne!(topology.is_boundary(pole), topology.is_boundary(a));
+            }
+        }
+        for &[a, b, c] in &spoked.lines {
+            assert!([a, b, c].iter().all(|&v| !topology.is_boundary(v)));
+        }
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
     #[test]

@@ -6,17 +6,18 @@
 //! ```
 
 use super::calm::{Ripples, calmer, ripples};
+use super::control::spokes;
 use super::profile::{self, Flank, lean, own_wall};
 use super::ridge::{Heights, Ridge};
 use super::rungs::{Rungs, rungs};
-use super::subdivide::{CoonsRules, PolyMesh, adaptive, limit, subdivide};
+use super::subdivide::{CoonsRules, PolyMesh, Triangles, adaptive, limit, subdivide};
 use super::{
     EditFault, FINE, Mesh, Over, Patch, Refined, Remark, Rim, RuledFault, Segments, Surface, Way,
     Window, control, draw_to, edits, inscribed_radius, literal, ratio, rim, ruled,
 };
 use crate::geom::{Grid, Tolerance};
 use crate::job::{
-    CrestSpec, EditsSpec, LayerSpec, Scheme, SkeletonSpec, SubdivisionSpec, SurfaceSpec,
+    Control, CrestSpec, EditsSpec, LayerSpec, Scheme, SkeletonSpec, SubdivisionSpec, SurfaceSpec,
 };
 use crate::outline::{Figure, Region};
 use crate::skeleton::{
@@ -32,6 +33,11 @@ const LEAST_EDGE_CELLS: f64 = 2.0;
 /// Most levels of subdivision that nobody asked for, and most faces that these may lead to.
 const MOST_LEVELS: f64 = 5.0;
 const MOST_DEFAULT_FACES: usize = 1 << 22;
+/// The same for Coons surfaces, and how long edges get, in cells: their control mesh has few faces, each from the outline to
+/// the crest, and facets along the outline must be short to have its draft.
+const MOST_COONS_LEVELS: f64 = 8.0;
+const MOST_COONS_FACES: usize = 1 << 20;
+const COONS_EDGE_CELLS: f64 = 1.0;
 /// Levels of a scheme that cuts triangles in four which two steps of Kobbelt's (in nine) stand for.
 const SQRT3_LEVELS: f64 = 1.584_962_500_721_156;
 /// Rounds of smoothing for a spine that no rungs carry.
@@ -327,22 +333,34 @@ impl Skeleton {
         spec: &SubdivisionSpec,
         cell_mm: f64,
     ) -> Result<Subdivided, RuledFault> {
-        let control = control(&self.sampled, &self.cells, ridge, spec.control, Rim::Curve);
-        let levels = spec.levels.unwrap_or_else(|| levels(&control, spec.scheme, cell_mm));
+        let (sampled, cells) = (&self.sampled, &self.cells);
+        let on_spokes = spec.scheme == Scheme::Coons && spec.control == Control::Quads;
+        let spoked = if on_spokes {
+            spokes(sampled, cells, ridge)
+        } else {
+            control(sampled, cells, ridge, spec.control, Rim::Curve).into()
+        };
+        let control = &spoked.mesh;
+        let levels = spec.levels.unwrap_or_else(|| levels(control, spec.scheme, cell_mm));
         let draft_rad = spec.draft_rad;
         let fine = match spec.adaptive_mm {
-            Some(tolerance_mm) => adaptive(&control, tolerance_mm, levels),
+            Some(tolerance_mm) => adaptive(control, tolerance_mm, levels),
             None if spec.scheme == Scheme::Coons => {
-                let rules = CoonsRules { draft_rad, ..CoonsRules::default() };
-                rim::coons_on(&control, rules, levels, &self.sampled)
+                let rules = CoonsRules {
+                    draft_rad,
+                    triangles: if on_spokes { Triangles::Sectors } else { Triangles::Faces },
+                    steady: true,
+                    ..CoonsRules::default()
+                };
+                rim::coons_on(&spoked, rules, levels, &self.sampled)
             }
-            None => subdivide(&control, spec.scheme, levels),
+            None => subdivide(control, spec.scheme, levels),
         };
         let fine = fine.and_then(|fine| limit(&fine, spec.scheme));
         let fine = fine.map_err(RuledFault::Subdivision)?;
         let mut mesh = fine.to_triangles();
         if spec.scheme.interpolates() && spec.scheme != Scheme::Coons {
-            rim::follow(&mut mesh, &control, &self.sampled);
+            rim::follow(&mut mesh, control, &self.sampled);
         }
         // Folds that are left are found by the check.
         let smoothed = mesh.unfold().unwrap_or(0);
@@ -351,7 +369,7 @@ impl Skeleton {
             ruled::check_area(covered, &self.sampled)?;
         }
         let covered = covered / ruled::area_of(&self.sampled);
-        Ok(Subdivided { mesh, covered, smoothed, control, levels, fine })
+        Ok(Subdivided { mesh, covered, smoothed, control: spoked.mesh, levels, fine })
     }
 }
 
@@ -398,15 +416,19 @@ impl Subdivided {
     }
 }
 
-/// How many times a mesh is to be refined until its edges are about two cells long: as long as it does not get too
-/// large, at most five times (Kobbelt's scheme: two steps for every one and a half).
+/// How many times a mesh is to be refined until its edges are about two cells long (one in Coons surfaces): as long as it does
+/// not get too large, at most five times (Coons eight times; Kobbelt's scheme: two steps for every one and a half).
 fn levels(control: &PolyMesh, scheme: Scheme, cell_mm: f64) -> u32 {
     let at = |v: u32| control.vertices[v as usize].truncate();
     let sides = control.faces().flat_map(|f| f.iter().zip(f.iter().cycle().skip(1)));
     let longest = sides.map(|(&a, &b)| at(a).distance(at(b))).fold(0.0, f64::max);
-    let wanted = libm::log2(longest / (LEAST_EDGE_CELLS * cell_mm)).ceil();
-    let room = libm::log2((MOST_DEFAULT_FACES / control.len().max(1)).max(1) as f64) / 2.0;
-    let levels = wanted.clamp(1.0, MOST_LEVELS).min(room.floor().max(1.0));
+    let (most, faces, cells) = match scheme {
+        Scheme::Coons => (MOST_COONS_LEVELS, MOST_COONS_FACES, COONS_EDGE_CELLS),
+        _ => (MOST_LEVELS, MOST_DEFAULT_FACES, LEAST_EDGE_CELLS),
+    };
+    let wanted = libm::log2(longest / (cells * cell_mm)).ceil();
+    let room = libm::log2((faces / control.len().max(1)).max(1) as f64) / 2.0;
+    let levels = wanted.clamp(1.0, most).min(room.floor().max(1.0));
     if scheme == Scheme::Sqrt3 { 2 * (levels / SQRT3_LEVELS).ceil() as u32 } else { levels as u32 }
 }
 

@@ -5,10 +5,15 @@
 //! so the vertices between are put onto the outline itself, as far along as they are along the curve. Layers that
 //! share a border then leave no groove between them.
 
+use super::control::Spoked;
+use super::subdivide::circle_tangent;
 use super::{CoonsMesh, CoonsRules, Mesh, PolyMesh, SubdivideError};
 use crate::geom::{DVec2, DVec3};
-use crate::skeleton::Sampled;
-use std::collections::HashMap;
+use crate::skeleton::{Curve, Sampled};
+use std::collections::{BTreeMap, HashMap};
+
+/// The direction of the outline is that over this part of an edge.
+const BESIDE: f64 = 0.125;
 
 /// Puts the rim between the vertices of the control mesh onto the curves of the outline. Pieces whose ends do not follow
 /// each other on one ring stay as they are.
@@ -60,41 +65,76 @@ pub(super) fn follow(mesh: &mut Mesh, control: &PolyMesh, sampled: &Sampled) {
     }
 }
 
-/// A Coons surface whose rim lies on the outline at every level: so its slope there is that of its rules. Edges of the rim
-/// whose ends do not follow each other on one ring stay as they come.
+/// A Coons surface whose rim lies on the outline at every level, and runs as it does: so its slope there is that of its
+/// rules. Edges of the rim whose ends do not follow each other on one ring stay as they come. Nothing lies higher or lower
+/// than the vertices of the control mesh do.
 ///
 /// # Errors
 /// [`SubdivideError`]: the mesh is no manifold, or gets too large.
 pub(super) fn coons_on(
-    control: &PolyMesh,
+    control: &Spoked,
     rules: CoonsRules,
     levels: u32,
     sampled: &Sampled,
 ) -> Result<PolyMesh, SubdivideError> {
-    let mut coons = CoonsMesh::new(control.clone(), rules)?;
+    let mut coons = CoonsMesh::new(control.mesh.clone(), rules)?;
+    control.lead(&mut coons);
     // Only ever asked for a key.
-    let mut places: HashMap<u32, (usize, f64)> = (coons.rim())
-        .map(|[from, ..]| (from, place_of(control.vertices[from as usize].truncate(), sampled)))
-        .collect();
-    for _ in 0..levels {
-        let mut fine = coons.refined()?;
-        for [from, to, between] in coons.rim() {
-            let (Some(&(ring, start)), Some(&(other, end))) = (places.get(&from), places.get(&to))
-            else {
-                continue;
-            };
-            let curve = &sampled.curves[ring];
-            let span = curve.wrapped(end - start);
-            if ring == other && span <= 0.5 * curve.length() {
-                let place = start + 0.5 * span;
-                let z = fine.mesh().vertices[between as usize].z;
-                fine.put(between, curve.at(place).extend(z));
-                places.insert(between, (ring, place));
-            }
+    let at = |v: u32| control.mesh.vertices[v as usize].truncate();
+    let mut places: HashMap<u32, (usize, f64)> =
+        coons.rim().map(|[from, ..]| (from, place_of(at(from), sampled))).collect();
+    let edges: Vec<[u32; 3]> = coons.rim().collect();
+    // The directions of the outline at its vertices, as far as the curve tells them: ahead and behind.
+    let mut ahead = HashMap::new();
+    let mut behind = HashMap::new();
+    for &[from, to, _] in &edges {
+        if let Some((curve, start, span)) = between(&places, from, to, sampled) {
+            let step = BESIDE * span;
+            ahead.insert(from, (curve.at(start + step) - curve.at(start)).extend(0.0));
+            behind.insert(to, (curve.at(start + span - step) - curve.at(start + span)).extend(0.0));
         }
-        coons = fine;
     }
-    Ok(coons.into_mesh())
+    for &[v, ..] in &edges {
+        let (Some(&forward), Some(&back)) = (ahead.get(&v), behind.get(&v)) else { continue };
+        let [forward, back] = if control.mesh.corner[v as usize] {
+            [forward, back]
+        } else {
+            let along = circle_tangent(-back, forward);
+            [along, -along]
+        };
+        coons.lead(v, forward.normalize_or_zero(), back.normalize_or_zero());
+    }
+    for _ in 0..levels {
+        let mut put = BTreeMap::new();
+        for [from, to, new] in coons.rim() {
+            let Some((curve, start, span)) = between(&places, from, to, sampled) else { continue };
+            let place = start + 0.5 * span;
+            let z = [from, to].map(|v| coons.mesh().vertices[v as usize].z);
+            let along = curve.at(place + BESIDE * span) - curve.at(place - BESIDE * span);
+            put.insert(new, [curve.at(place).extend(0.5 * (z[0] + z[1])), along.extend(0.0)]);
+            places.insert(new, (places[&from].0, place));
+        }
+        coons = coons.refined_on(&put)?;
+    }
+    let mut mesh = coons.into_mesh();
+    let heights = || control.mesh.vertices.iter().map(|v| v.z);
+    let low = heights().fold(f64::INFINITY, f64::min);
+    let high = heights().fold(f64::NEG_INFINITY, f64::max);
+    mesh.vertices.iter_mut().for_each(|v| v.z = v.z.max(low).min(high));
+    Ok(mesh)
+}
+
+/// The curve from one vertex to the next: itself, the first one's place and how far the next one is.
+fn between<'a>(
+    places: &HashMap<u32, (usize, f64)>,
+    from: u32,
+    to: u32,
+    sampled: &'a Sampled,
+) -> Option<(&'a Curve, f64, f64)> {
+    let (&(ring, start), &(other, end)) = (places.get(&from)?, places.get(&to)?);
+    let curve = &sampled.curves[ring];
+    let span = curve.wrapped(end - start);
+    (ring == other && span > 0.0 && span <= 0.5 * curve.length()).then_some((curve, start, span))
 }
 
 /// The ring that a point lies on and its place there.

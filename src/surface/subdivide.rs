@@ -26,7 +26,8 @@ mod topology;
 
 pub use adaptive::adaptive;
 pub use closed_form::ClosedForm;
-pub use coons::{CoonsMesh, CoonsRules, Handle};
+pub use coons::{CoonsMesh, CoonsRules, Handle, Triangles};
+pub(super) use coons::{circle_tangent, passing};
 pub use creased::{CreasedMesh, SHARP};
 pub use edit::{Edit, EditError, EditRules, Edited, Method, Spot, edit};
 pub use evaluate::{EvaluateError, LimitSurface, Sample};

@@ -3,10 +3,22 @@
 use super::*;
 use std::f64::consts::TAU;
 
-const PUBLISHED: CoonsRules =
-    CoonsRules { handle: Handle::Third, draft_rad: None, gentle: false, level: false };
-const ARC: CoonsRules =
-    CoonsRules { handle: Handle::Arc, draft_rad: None, gentle: true, level: false };
+const PUBLISHED: CoonsRules = CoonsRules {
+    handle: Handle::Third,
+    draft_rad: None,
+    gentle: false,
+    level: false,
+    triangles: Triangles::Faces,
+    steady: false,
+};
+const ARC: CoonsRules = CoonsRules {
+    handle: Handle::Arc,
+    draft_rad: None,
+    gentle: true,
+    level: false,
+    triangles: Triangles::Faces,
+    steady: false,
+};
 
 /// The cube of the specification: 6 = (1, 1, 1), 7 = (-1, 1, 1).
 pub(in super::super) fn cube() -> PolyMesh {
@@ -110,7 +122,7 @@ fn an_open_grid_is_refined_as_tabled() {
     let start = refined(grid(3, [1, 1]), CoonsRules { gentle: true, ..PUBLISHED }, 0);
     let edge = DVec3::new(0.0, 1.0, 1.0).normalize();
     let lean = angle(start.tangent(1, 4).unwrap(), edge);
-    assert!((lean - MOST_LEAN).abs() < 1e-12, "{lean}");
+    assert!((lean - std::f64::consts::FRAC_PI_6).abs() < 1e-12, "{lean}");
 }
 
 fn angle(a: DVec3, b: DVec3) -> f64 {
@@ -242,4 +254,117 @@ fn degenerate_meshes_give_finite_vertices() {
         let fine = refined(flat.clone(), rules, 3);
         assert!(fine.mesh().vertices.iter().all(|v| v.is_finite()));
     }
+}
+
+/// A disc of radius 10 whose sectors meet in a pole 3 high.
+fn sectors(count: u32, height: f64) -> PolyMesh {
+    let mut disc = PolyMesh::new();
+    for k in 0..count {
+        let (sin, cos) = libm::sincos(TAU * f64::from(k) / f64::from(count));
+        disc.add_vertex(DVec3::new(10.0 * cos, 10.0 * sin, 0.0), false);
+    }
+    let pole = disc.add_vertex(DVec3::new(0.0, 0.0, height), false);
+    for k in 0..count {
+        disc.add_face(&[pole, k, (k + 1) % count]);
+    }
+    disc
+}
+
+const RELIEF: CoonsRules =
+    CoonsRules { level: true, triangles: Triangles::Sectors, steady: true, ..ARC };
+
+/// Sectors round a pole have no rays: heights go by the distance from it alone.
+#[test]
+fn sectors_of_a_disc_make_a_surface_of_revolution() {
+    for count in [8, 13] {
+        let rules = CoonsRules { draft_rad: Some(0.5), ..RELIEF };
+        let fine = refined(sectors(count, 3.0), rules, 5);
+        assert_eq!(fine.mesh().vertices[count as usize], DVec3::new(0.0, 0.0, 3.0));
+        let mut all: Vec<[f64; 2]> =
+            fine.mesh().vertices.iter().map(|v| [v.truncate().length(), v.z]).collect();
+        all.sort_by(|a, b| a[0].total_cmp(&b[0]));
+        let round: Vec<_> = all.windows(2).filter(|w| w[1][0] - w[0][0] < 1e-9).collect();
+        assert!(round.len() > all.len() / 2);
+        assert!(round.iter().all(|w| (w[1][1] - w[0][1]).abs() < 1e-8), "rays");
+    }
+}
+
+/// What a steady surface looks like in plan does not go by its heights: it cannot fold for being steep.
+#[test]
+fn the_plan_of_a_steady_surface_does_not_go_by_its_heights() {
+    for draft_rad in [None, Some(0.5)] {
+        let rules = CoonsRules { draft_rad, ..RELIEF };
+        let flat = refined(sectors(9, 1.0), rules, 4);
+        let steep = refined(sectors(9, 40.0), rules, 4);
+        for (a, b) in flat.mesh().vertices.iter().zip(&steep.mesh().vertices) {
+            assert!(a.truncate().distance(b.truncate()) < 1e-9, "{a} {b}");
+        }
+        assert!(flat.mesh().vertices.iter().all(|v| (-1e-9..1.0 + 1e-9).contains(&v.z)));
+        assert!(steep.mesh().vertices.iter().all(|v| (-1e-9..40.0 + 1e-9).contains(&v.z)));
+    }
+}
+
+/// Along the outline and at the pole, tangents that a user gives are kept, as are the vertices.
+#[test]
+fn given_tangents_are_interpolated_round_a_pole() {
+    let rules = CoonsRules { draft_rad: Some(0.5), ..RELIEF };
+    let mut coons = CoonsMesh::new(sectors(8, 3.0), rules).unwrap();
+    let at_pole = DVec3::new(1.0, 0.0, -0.4).normalize();
+    let at_outline = DVec3::new(-1.0, 0.1, 1.0).normalize();
+    assert!(
+        coons.set_tangent(8, 0, at_pole)
+            && coons.set_tangent(2, 8, at_outline.with_x(0.1).with_y(-1.0))
+    );
+    let at_outline = at_outline.with_x(0.1).with_y(-1.0).normalize();
+    let before = coons.mesh().vertices.clone();
+    let mut off = Vec::new();
+    for _ in 0..7 {
+        coons = coons.refined().unwrap();
+        assert_eq!(coons.mesh().vertices[..before.len()], before);
+        let topology = Topology::of(coons.mesh()).unwrap();
+        let mut ring = Vec::new();
+        let mut least = |v: u32, given: DVec3| {
+            topology.ring(v, &mut ring);
+            let rays = ring.iter().map(|&r| coons.mesh().vertices[r as usize] - before[v as usize]);
+            rays.map(|ray| angle(ray, given)).fold(f64::INFINITY, f64::min)
+        };
+        off.push([least(8, at_pole), least(2, at_outline)]);
+    }
+    for k in 0..2 {
+        let falls = off.windows(2).skip(3).all(|w| w[1][k] < 0.6 * w[0][k] + 1e-12);
+        assert!(falls && off[6][k] < 0.01, "{off:?}");
+    }
+}
+
+/// Inside a corner the surface that rises from both sides is as high as the nearer one makes it: two planes over a corner
+/// that points outward, a cone round one that points inward.
+#[test]
+fn draft_at_corners_goes_by_the_distance_from_the_outline() {
+    let slope = libm::tan(0.5);
+    let (forward, up) = (DVec3::X, DVec3::Y);
+    let rise = |backward: DVec3, degrees: f64| {
+        let (sin, cos) = libm::sincos(degrees.to_radians());
+        let t = pieces::drafted(forward, backward, DVec3::new(cos, sin, 7.0), 0.5);
+        assert!((t.length() - 1.0).abs() < 1e-12);
+        assert!((t.y * cos - t.x * sin).abs() < 1e-12, "{t}");
+        t.z / t.truncate().length() / slope
+    };
+    for (backward, degrees, distance) in [
+        (up, 45.0, 0.5_f64.sqrt()),
+        (up, 30.0, 0.5),
+        (up, 60.0, 0.5),
+        (-forward, 90.0, 1.0),
+        (-forward, 30.0, 0.5),
+        (-up, 45.0, 0.5_f64.sqrt()),
+        (-up, 90.0, 1.0),
+        (-up, 135.0, 1.0),
+        (-up, 180.0, 1.0),
+        (-up, 240.0, 0.5),
+    ] {
+        let got = rise(backward, degrees);
+        assert!((got - distance).abs() < 1e-12, "{degrees}: {got}");
+    }
+    // A direction that leads outside gives way to the one between both sides.
+    let t = pieces::drafted(forward, up, DVec3::new(-1.0, -1.0, 0.0), 0.5);
+    assert!(t.x > 0.0 && (t.x - t.y).abs() < 1e-12, "{t}");
 }
