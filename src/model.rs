@@ -10,7 +10,7 @@
 mod control;
 mod obj;
 
-use crate::geom::{DVec3, Grid, Ring, orient};
+use crate::geom::{DVec3, Ring, orient};
 use crate::job::{Job, LayerSpec, MeshSpec, SurfaceSpec};
 use crate::outline::{Figure, Outlines, RegionFault, silhouette};
 use crate::surface::{CreasedMesh, Mesh, Raised, SubdivideError, Surface, levels};
@@ -224,7 +224,7 @@ fn named(job: &Job) -> impl Iterator<Item = (usize, &LayerSpec, &MeshSpec)> {
     })
 }
 
-/// Fills in the layers that are meshes: `models` are those of the job, in the order of its layers. `outlines` and `raised`
+/// Fills in the layers that are meshes, for a grid of a pitch: `models` are those of the job, in the order of its layers. `outlines` and `raised`
 /// get one figure and its surface for each.
 ///
 /// # Errors
@@ -232,7 +232,7 @@ fn named(job: &Job) -> impl Iterator<Item = (usize, &LayerSpec, &MeshSpec)> {
 pub fn raise(
     models: &[Model],
     job: &Job,
-    grid: &Grid,
+    pitch_mm: f64,
     outlines: &mut Outlines,
     raised: &mut Raised,
 ) -> Result<(), ModelError> {
@@ -246,7 +246,7 @@ pub fn raise(
         .zip(models)
         .with_max_len(1)
         .map(|(&(_, layer, spec), model)| {
-            let meshes = model.triangles(layer, spec, grid.pitch_mm)?;
+            let meshes = model.triangles(layer, spec, pitch_mm)?;
             let rings: Vec<Ring> = meshes.iter().flat_map(rim).collect();
             let regions = silhouette(&rings, chord_mm * chord_mm)
                 .map_err(|why| ModelError::Outline { file: model.file.clone(), why })?;
