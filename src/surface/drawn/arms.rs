@@ -309,7 +309,8 @@ fn samples(line: &Line, piece: &Piece, edge_mm: f64) -> Vec<f64> {
     // The strip goes on beyond a free end by its last edge: a short one.
     if !line.closed {
         let ends = [(0, piece.from + LAST * step), (1, piece.to - LAST * step)];
-        let free = |end: usize| piece.joints[end].is_none() && line.ends[end] == CrestEnds::Natural;
+        let free =
+            |end: usize| piece.joints[end].is_none() && line.ends[end] != CrestEnds::Boundary;
         out.extend(ends.iter().filter(|e| free(e.0)).map(|e| e.1));
     }
     out.sort_unstable_by(f64::total_cmp);
