@@ -15,7 +15,7 @@ pub use measures::{Gauge, Measures};
 pub use subject::{Cuts, Subject, Wanted};
 
 use crate::geom::{DVec2, GridError, Heightfield};
-use crate::job::LayerSpec;
+use crate::job::{LayerSpec, SurfaceSpec};
 use crate::relief::{ReliefError, merge, sampled};
 use crate::surface::{
     Patch, RaisedFigure, Remark, Surface, SurfaceError, raise as raise_figure, tell,
@@ -50,6 +50,16 @@ pub enum CompareError {
         /// The name asked for.
         name: String,
         /// The names there are.
+        there: String,
+    },
+    /// No layer has drawn crests, or none is a mesh.
+    #[error("no layer {lacks}; leave {name} out, or choose from: {there}")]
+    NotInJob {
+        /// The method asked for.
+        name: String,
+        /// What no layer has.
+        lacks: &'static str,
+        /// The methods there are.
         there: String,
     },
     /// The grid would have too many nodes.
@@ -105,22 +115,50 @@ pub struct Compared {
     pub relief: Heightfield,
 }
 
-/// Raises all figures of the subject by one method.
+/// Raises all figures of the subject by one method. Layers that are meshes keep their surface, which `meshes` gives for
+/// each layer (empty for all others); by [`SurfaceSpec::DRAWN`] layers without drawn crests keep the method of the job.
 ///
 /// # Errors
 /// [`CompareError`]: an unknown method, or an outline or setting that is not a usable number.
-pub fn raise(subject: &Subject, method: &str) -> Result<Raised, CompareError> {
-    let layers: Option<Vec<LayerSpec>> = (subject.job().layers.iter())
-        .map(|layer| Some(LayerSpec { surface: layer.surface.by(method)?, ..layer.clone() }))
-        .collect();
-    let layers = layers.ok_or_else(|| CompareError::NoMethod {
-        name: method.to_owned(),
-        there: crate::job::SurfaceSpec::METHODS.join(", "),
-    })?;
+pub fn raise(
+    subject: &Subject,
+    method: &str,
+    meshes: &[Vec<Surface>],
+) -> Result<Raised, CompareError> {
+    let own = &subject.job().layers;
+    let drawn = |layer: &LayerSpec| matches!(layer.surface, SurfaceSpec::Drawn(_));
+    let there = || SurfaceSpec::METHODS.join(", ");
+    for (special, lacks, any) in [
+        (SurfaceSpec::DRAWN, "has [[layer.crest]] tables", own.iter().any(drawn)),
+        (SurfaceSpec::MESHED, "is a mesh", own.iter().any(|layer| layer.mesh().is_some())),
+    ] {
+        if method == special && !any {
+            return Err(CompareError::NotInJob { name: method.to_owned(), lacks, there: there() });
+        }
+    }
+    let keeps = |layer: &LayerSpec| {
+        layer.mesh().is_some()
+            || method == SurfaceSpec::MESHED
+            || (method == SurfaceSpec::DRAWN && !drawn(layer))
+    };
+    let by_method = |layer: &LayerSpec| {
+        let surface =
+            if keeps(layer) { layer.surface.clone() } else { layer.surface.by(method)? };
+        Some(LayerSpec { surface, ..layer.clone() })
+    };
+    let layers: Option<Vec<LayerSpec>> = own.iter().map(by_method).collect();
+    let layers =
+        layers.ok_or_else(|| CompareError::NoMethod { name: method.to_owned(), there: there() })?;
     let tolerance = &subject.job().tolerance;
     let figures: Result<Vec<Vec<RaisedFigure>>, SurfaceError> = (subject.outlines().layers.iter())
         .zip(&layers)
-        .map(|(outline, layer)| {
+        .enumerate()
+        .map(|(k, (outline, layer))| {
+            if layer.mesh().is_some() {
+                let given = meshes.get(k).into_iter().flatten().cloned();
+                let raised = |surface| RaisedFigure { surface, remarks: Vec::new() };
+                return Ok(given.map(raised).collect());
+            }
             let figures = outline.figures.par_iter().with_max_len(1);
             figures
                 .map(|figure| {
@@ -168,7 +206,10 @@ pub fn measure(subject: &Subject, raised: Raised) -> Result<Compared, CompareErr
             overshoot_mm =
                 overshoot_mm.max(f64::from(highest) - layer.height_mm.max(layer.base_mm));
             gauge.add(&patch, grid, |_: DVec2| None);
-            gauge.add_ridge(&patch, grid, crest.iter().copied());
+            // Drawn crests need not lie over the spine.
+            if !matches!(layer.surface, SurfaceSpec::Drawn(_)) {
+                gauge.add_ridge(&patch, grid, crest.iter().copied());
+            }
             patches.push(Surface::Field(patch));
         }
         surfaces.push(patches);

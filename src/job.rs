@@ -34,8 +34,8 @@ pub use library::{BUILT_IN_FILES, Library};
 pub use mesh::MeshSpec;
 pub use smooth::{DrawnCurves, SmoothSpec};
 pub use surface::{
-    Control, CourseSpec, CrestSpec, DrawnCrestSpec, DrawnSpec, Join, Profile, Prune, Scheme,
-    Significance, SkeletonSpec, Split, SubdivisionSpec, SurfaceSpec,
+    Control, CourseSpec, CrestEnds, CrestSpec, DrawnCrestSpec, DrawnSpec, Join, Profile, Prune,
+    Scheme, Significance, SkeletonSpec, Split, SubdivisionSpec, SurfaceSpec,
 };
 pub use types::{
     ArtworkSpec, Backdrop, Background, Combine, Connectivity, CutterShape, CutterSpec, Fit, Follow,
@@ -43,4 +43,4 @@ pub use types::{
     Pattern, Place, ReliefSpec, Rgb, Selector, Stepover, Stock, TraceMethod, TraceSpec, Within,
     Wood,
 };
-pub use write::{defaults_table, template};
+pub use write::{defaults_table, mesh_template, template};

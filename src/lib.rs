@@ -199,7 +199,7 @@ pub fn design_of(
     enter("surfaces");
     let grid = relief::grid_of(&job)?;
     let mut raised = surface::raise_all(&outlines, &job.layers, &grid, &job.tolerance)?;
-    model::raise(models, &job, &grid, &mut outlines, &mut raised)?;
+    model::raise(models, &job, grid.pitch_mm, &mut outlines, &mut raised)?;
     enter("merge");
     let raised_notes = raised.notes.clone();
     let relief = relief::merge(&job, &outlines, raised.surfaces, &grid)?;

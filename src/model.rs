@@ -10,7 +10,7 @@
 mod control;
 mod obj;
 
-use crate::geom::{DVec3, Grid, Ring, orient};
+use crate::geom::{DVec3, Ring, orient};
 use crate::job::{Job, LayerSpec, MeshSpec, SurfaceSpec};
 use crate::outline::{Figure, Outlines, RegionFault, silhouette};
 use crate::surface::{
@@ -251,15 +251,15 @@ struct Made {
     remarks: Vec<Remark>,
 }
 
-/// Fills in the layers that are meshes: `models` are those of the job, in the order of its layers. `outlines` and `raised`
-/// get one figure and its surface for each.
+/// Fills in the layers that are meshes, for a grid of a pitch: `models` are those of the job, in the order of its layers.
+/// `outlines` and `raised` get one figure and its surface for each.
 ///
 /// # Errors
 /// [`ModelError`].
 pub fn raise(
     models: &[Model],
     job: &Job,
-    grid: &Grid,
+    pitch_mm: f64,
     outlines: &mut Outlines,
     raised: &mut Raised,
 ) -> Result<(), ModelError> {
@@ -274,7 +274,7 @@ pub fn raise(
         .with_max_len(1)
         .map(|(&(_, layer, spec), model)| {
             let mut remarks = Vec::new();
-            let meshes = model.triangles(layer, spec, grid.pitch_mm, &mut remarks)?;
+            let meshes = model.triangles(layer, spec, pitch_mm, &mut remarks)?;
             let rings: Vec<Ring> = meshes.iter().flat_map(rim).collect();
             let regions = silhouette(&rings, chord_mm * chord_mm)
                 .map_err(|why| ModelError::Outline { file: model.file.clone(), why })?;
@@ -292,7 +292,7 @@ pub fn raise(
         let Made { figure, surface, hidden, remarks } = made?;
         let told: Vec<(&str, Remark)> =
             remarks.into_iter().map(|r| (model.file.as_str(), r)).collect();
-        tell(layer, &told, grid.pitch_mm, &mut raised.notes);
+        tell(layer, &told, pitch_mm, &mut raised.notes);
         outlines.layers[k].figures = vec![figure];
         raised.surfaces[k] = vec![surface];
         raised.notes.extend(model.notes.iter().cloned());

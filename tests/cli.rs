@@ -944,3 +944,90 @@ fn the_simulated_controller_refuses_what_it_cannot_have() {
         refused(&desk, &["controller", "--fault", "fire@3"], 2, &["fire", "drop-ok"]);
     }
 }
+
+/// A blade of 30 x 20 mm and a rib that is drawn across its outline.
+const BLADE: &str = r##"<svg xmlns="http://www.w3.org/2000/svg" width="40mm" height="30mm" viewBox="0 0 40 30">
+<path id="blade" d="M5 5 H35 V25 H5 Z" fill="#008463"/><path id="rib" d="M2 14 C15 10 25 18 38 16" fill="none"/></svg>"##;
+
+/// The select of its crest stands in line 9, its ends in line 11.
+const BLADE_JOB: &str = r#"[artwork]
+file = "blade.svg"
+
+[[layer]]
+select = "id:blade"
+surface = "crest"
+height_mm = 3
+[[layer.crest]]
+select = "id:rib"
+heights = [[0, 0], [0.5, 3], [1, 0]]
+ends = "boundary"
+"#;
+
+fn blade_desk(old: &str, new: &str) -> Desk {
+    let desk = Desk::new();
+    desk.put("blade.svg", BLADE);
+    assert!(BLADE_JOB.contains(old));
+    desk.put("blade.toml", BLADE_JOB.replacen(old, new, 1));
+    desk
+}
+
+#[test]
+fn a_crest_may_end_on_the_outline_and_has_a_column_of_its_own() {
+    let desk = blade_desk("", "");
+    let args = ["surfaces", "blade.toml", "--pitch", "0.2", "--json"];
+    let told = json_of(&desk.run(&[&args[..], &["--method", "ruled,crest"]].concat()));
+    let methods = told["methods"].as_array().unwrap();
+    let names: Vec<_> = methods.iter().map(|m| m["method"].as_str().unwrap()).collect();
+    assert_eq!(names, ["ruled", "crest"]);
+    let highest = methods[1]["measures"]["highest"].as_f64().unwrap();
+    assert!((highest - 3.0).abs() < 0.05, "{told:#}");
+    refused(
+        &desk,
+        &["surfaces", "blade.svg", "--method", "crest"],
+        1,
+        &["[[layer.crest]]", "ruled"],
+    );
+    refused(&desk, &["surfaces", "blade.toml", "--method", "mesh"], 1, &["is a mesh", "ruled"]);
+}
+
+#[test]
+fn faults_of_crests_are_told_with_their_place_and_cure() {
+    let check = ["check", "blade.toml"];
+    let wrong = blade_desk("\"boundary\"", "\"bounded\"");
+    refused(&wrong, &check, 1, &["blade.toml:11:8", "boundary", "natural"]);
+    let lost = blade_desk("id:rib", "id:rip");
+    refused(&lost, &check, 1, &["blade.toml:9:10", "id:rip", "did you mean \"id:rib\"?"]);
+    let high = blade_desk("[1, 0]", "[1, 2]");
+    refused(&high, &check, 1, &["2.000 mm", "outline", "end its heights"]);
+}
+
+/// A tent over nine vertices.
+const TENT: &str = "v 0 0 0\nv 1 0 0\nv 2 0 0\nv 0 1 0\nv 1 1 1\nv 2 1 0\nv 0 2 0\nv 1 2 0\nv 2 2 0\n\
+                    f 1 2 5 4\nf 2 3 6 5\nf 4 5 8 7\nf 5 6 9 8\n";
+
+#[test]
+fn a_mesh_by_itself_is_a_job() {
+    let desk = Desk::new();
+    desk.put("tent.obj", TENT);
+    let out = desk.run(&["new", "tent.obj"]);
+    assert_eq!(out.status.code(), Some(0), "{}", stderr(&out));
+    let job = String::from_utf8(desk.files()["tent.toml"].clone()).unwrap();
+    assert!(job.contains("\nmesh = { file = \"tent.obj\", width_mm = "), "{job}");
+    for input in ["tent.obj", "tent.toml"] {
+        let out = desk.run(&["check", input]);
+        assert_eq!(out.status.code(), Some(0), "{input}: {}", stderr(&out));
+    }
+    for input in ["tent.obj", "tent.toml"] {
+        let folder = format!("{input}-out");
+        let args = ["surfaces", input, "--pitch", "0.5", "--json", "--out", &folder];
+        let told = json_of(&desk.run(&args));
+        let methods = told["methods"].as_array().unwrap();
+        assert_eq!((methods.len(), &methods[0]["method"]), (1, &"mesh".into()));
+        assert!(methods[0]["faces"].as_u64().unwrap() > 100, "{told:#}");
+        assert!(methods[0]["measures"]["highest"].as_f64().unwrap() > 1.0, "{told:#}");
+        refused(&desk, &["surfaces", input, "--method", "ruled"], 2, &["every layer is a mesh"]);
+    }
+    desk.put("broken.obj", "v 0 0 0\nf 1 2 3\n");
+    refused(&desk, &["check", "broken.obj"], 1, &["broken.obj:2:5"]);
+    refused(&desk, &["new", "broken.obj"], 1, &["broken.obj:2:5"]);
+}

@@ -1,6 +1,6 @@
 //! What a job needs to know of the artwork before it can be settled.
 
-use super::Artwork;
+use super::{Artwork, Part, Shape};
 use crate::geom::Bounds;
 use crate::job::{Found, FoundLayer, Selector};
 use std::collections::HashSet;
@@ -46,7 +46,31 @@ impl Artwork {
             unit_mm: self.unit_mm,
             layers: layers.collect(),
             selectors,
+            paths: self.paths_found(),
             meshes: Vec::new(),
         }
+    }
+    /// Every selector that names a path: those of lines first.
+    fn paths_found(&self) -> Vec<Selector> {
+        let mut paths: Vec<Selector> = Vec::new();
+        let mut seen = HashSet::new();
+        let (lines, fills): (Vec<&Shape>, Vec<&Shape>) =
+            self.shapes.iter().partition(|shape| shape.part != Part::Fill);
+        for shape in lines.into_iter().chain(fills) {
+            let paint = match shape.part {
+                Part::Fill => Some(Selector::Fill(shape.color)),
+                Part::Stroke => Some(Selector::Stroke(shape.color)),
+                Part::Open => None,
+            };
+            let labels = shape.labels.iter().map(|name| Selector::Label(name.clone()));
+            let ids = shape.ids.iter().map(|name| Selector::Id(name.clone()));
+            let layers = shape.layers.iter().map(|name| Selector::Layer(name.clone()));
+            for selector in labels.chain(ids).chain(layers).chain(paint) {
+                if seen.insert(selector.to_string()) {
+                    paths.push(selector);
+                }
+            }
+        }
+        paths
     }
 }

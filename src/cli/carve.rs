@@ -17,7 +17,7 @@ use std::path::{Path, PathBuf};
                         relievo carve rose.toml --timings      a job file, and how long each stage took"
 )]
 pub(super) struct Args {
-    /// A job file (.toml) or artwork (.svg, .svgz, .png, .jpg)
+    /// A job file (.toml), artwork (.svg, .svgz, .png, .jpg) or a mesh (.obj)
     pub(super) input: PathBuf,
 
     /// Folder for the outputs (default: NAME-carving beside the input)

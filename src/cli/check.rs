@@ -7,7 +7,7 @@ use std::path::PathBuf;
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  relievo check rose.toml")]
 pub(super) struct Args {
-    /// A job file (.toml) or artwork (.svg, .svgz, .png, .jpg)
+    /// A job file (.toml), artwork (.svg, .svgz, .png, .jpg) or a mesh (.obj)
     input: PathBuf,
 
     /// Print nothing when all is well

@@ -3,7 +3,7 @@
 use super::files;
 use crate::artwork::{Artwork, Fonts, is_picture, read_bitmap, read_svg};
 use crate::controller::Store;
-use crate::job::{ArtworkSpec, Draft, Found, Library, Machine};
+use crate::job::{ArtworkSpec, Draft, Found, Library, Machine, MeshSpec};
 use crate::model::Model;
 use anyhow::{Context, Result, anyhow, bail};
 use std::path::{Path, PathBuf};
@@ -21,7 +21,8 @@ pub(super) struct Input {
     pub(super) library: Library,
 }
 
-/// Reads a job file (`.toml`) or artwork (`.svg`, `.svgz`, `.png`, `.jpg`, `.jpeg`) and, for a job, the artwork it names.
+/// Reads a job file (`.toml`), artwork (`.svg`, `.svgz`, `.png`, `.jpg`, `.jpeg`) or a mesh (`.obj`) and, for a job, the artwork
+/// and the meshes it names.
 pub(super) fn load(path: &Path) -> Result<Input> {
     let beside = path.parent().unwrap_or(Path::new(""));
     let library = library(beside)?;
@@ -43,18 +44,13 @@ pub(super) fn load(path: &Path) -> Result<Input> {
         }
         "" => {
             bail!(
-                "{} has no extension; give a job file (.toml) or artwork (.svg, .png, .jpg)",
+                "{} has no extension; give a job file (.toml), artwork (.svg, .png, .jpg) or a mesh (.obj)",
                 path.display()
             )
         }
-        "obj" => bail!(
-            "{}: a mesh is a layer of a job; write a file mesh.toml with the two lines [[layer]] and mesh = \"{}\" beside it \
-             and give that",
-            path.display(),
-            path.file_name().unwrap_or_default().to_string_lossy()
-        ),
+        "obj" => return load_mesh(path, library),
         other => bail!(
-            "{}: '.{other}' files are not read; give a job file (.toml) or artwork (.svg, .svgz, .png, .jpg)",
+            "{}: '.{other}' files are not read; give a job file (.toml), artwork (.svg, .svgz, .png, .jpg) or a mesh (.obj)",
             path.display()
         ),
     };
@@ -95,6 +91,22 @@ pub(super) fn load(path: &Path) -> Result<Input> {
     let fonts = if needs_fonts(&bytes) { load_fonts(&dirs) } else { Fonts::none() };
     let artwork = read_svg(&bytes, &fonts).with_context(|| artwork_file.display().to_string())?;
     Ok(input(draft, artwork))
+}
+
+/// A mesh by itself: the only layer of a job without artwork.
+fn load_mesh(path: &Path, library: Library) -> Result<Input> {
+    let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let spec = MeshSpec::of_file(name.clone());
+    let model = Model::read(&files::read(path)?, &path.display().to_string(), &spec)?;
+    let draft = Draft::for_mesh(&name, model.size(), &library)?;
+    Ok(Input {
+        draft,
+        artwork: Artwork::none(),
+        artwork_file: path.to_path_buf(),
+        models: vec![model],
+        model_files: vec![path.to_path_buf()],
+        library,
+    })
 }
 
 impl Input {

@@ -1,4 +1,4 @@
-//! `relievo new ART.svg`: a commented job file, one layer for each colour found, ready to edit.
+//! `relievo new ART.svg`: a commented job file, one layer for each colour found or one for a mesh, ready to edit.
 
 use super::{Stop, files, inputs, observe};
 use crate::job;
@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  relievo new rose.svg        writes rose.toml")]
 pub(super) struct Args {
-    /// The artwork (.svg, .svgz, .png, .jpg)
+    /// The artwork (.svg, .svgz, .png, .jpg) or a mesh (.obj)
     artwork: PathBuf,
 
     /// Where to write (default: beside the artwork, ART.toml)
@@ -23,7 +23,7 @@ pub(super) struct Args {
 pub(super) fn run(args: &Args) -> Result<(), Stop> {
     if args.artwork.extension().is_some_and(|e| e == "toml") {
         return Err(anyhow!(
-            "{} is a job file already; give artwork (.svg, .png, .jpg)",
+            "{} is a job file already; give artwork (.svg, .png, .jpg) or a mesh (.obj)",
             args.artwork.display()
         )
         .into());
@@ -32,7 +32,12 @@ pub(super) fn run(args: &Args) -> Result<(), Stop> {
     let input = inputs::load(&args.artwork)?;
     let folder = out.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let name = files::name_from(folder, &args.artwork)?;
-    let text = job::template(&name, &input.artwork.found(), &input.library)?;
+    let is_mesh = !input.models.is_empty();
+    let text = if is_mesh {
+        job::mesh_template(&name, &input.found(), &input.library)?
+    } else {
+        job::template(&name, &input.found(), &input.library)?
+    };
     write_new(&out, &text)?;
     if !args.quiet {
         // The colours of a picture are found, not drawn: say which, and how much of each.

@@ -5,9 +5,11 @@ use super::observe::{self, Stages};
 use super::{Stop, inputs, outcome, tables};
 use crate::CarveError;
 use crate::compare::{self, Compared, Subject, Wanted};
-use crate::job::{LayerSpec, SurfaceSpec};
-use crate::outline;
+use crate::job::{Job, LayerSpec, MeshSpec, SurfaceSpec};
+use crate::model::{self, Model};
+use crate::outline::{self, Outlines};
 use crate::report::{self, SideBySide};
+use crate::surface::{self, Surface};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -18,13 +20,14 @@ use std::time::Instant;
   relievo surfaces lotus.toml --layer heart --method ruled,butterfly --timings
   relievo surfaces --figures                         the known shapes, measured beside the tabled figures")]
 pub(super) struct Args {
-    /// Artwork (.svg, .svgz, .png, .jpg) or a job file (.toml)
+    /// Artwork (.svg, .svgz, .png, .jpg), a mesh (.obj) or a job file (.toml)
     #[arg(required_unless_present = "figures")]
     input: Option<PathBuf>,
 
-    /// Only these methods, in this order (default: all)
+    /// Only these methods, in this order (default: all; crest and mesh where the job has them)
     #[arg(long = "method", value_name = "NAME,...", value_delimiter = ',',
-          value_parser = clap::builder::PossibleValuesParser::new(SurfaceSpec::METHODS))]
+          value_parser = clap::builder::PossibleValuesParser::new(
+              SurfaceSpec::METHODS.iter().copied().chain([SurfaceSpec::DRAWN, SurfaceSpec::MESHED])))]
     methods: Vec<String>,
 
     /// Only this layer, standing by itself
@@ -69,15 +72,7 @@ pub(super) struct Args {
 }
 
 pub(super) fn run(args: &Args) -> Result<(), Stop> {
-    let mut methods: Vec<&str> = Vec::new();
-    for method in &args.methods {
-        if !methods.contains(&method.as_str()) {
-            methods.push(method);
-        }
-    }
-    if methods.is_empty() {
-        methods.extend(SurfaceSpec::METHODS);
-    }
+    let mut methods = asked_for(args);
     let stages = Stages::new(args.quiet);
     let Some(path) = args.input.as_deref().filter(|_| !args.figures) else {
         return figures(args, &methods, &stages);
@@ -88,22 +83,14 @@ pub(super) fn run(args: &Args) -> Result<(), Stop> {
     let with_file = |e: CarveError| outcome::with_file(e, &input.artwork_file);
     let found = input.found();
     let job = input.draft.without_travel_limits().settle(&found)?;
-    let is_mesh = |layer: &&LayerSpec| {
-        layer.mesh().is_some() && args.layer.as_ref().is_none_or(|wanted| *wanted == layer.name)
-    };
-    if let Some(layer) = job.layers.iter().find(is_mesh) {
-        return Err(Stop::Usage(format!(
-            "layer '{}' is a mesh: there is no other surface of it to compare; name a layer of the artwork by --layer",
-            layer.name
-        )));
-    }
     let placed = input
         .artwork
         .place(&job.layers, job.artwork_unit_mm, job.artwork_lower_left_mm)
         .map_err(|e| with_file(e.into()))?;
     stages.enter("outlines");
-    let outlines =
+    let mut outlines =
         outline::trace(&placed, &job.layers, &job.tolerance).map_err(|e| with_file(e.into()))?;
+    meshes_at(&job, job.relief.pitch_mm, &input.models, &mut outlines)?;
     let wanted = Wanted {
         layer: args.layer.clone(),
         outline: args.outline,
@@ -111,11 +98,10 @@ pub(super) fn run(args: &Args) -> Result<(), Stop> {
         pitch_mm: args.pitch,
     };
     let subject = Subject::of(&job, &outlines, &wanted)?;
-    // Drawn crests are the job's own: there is nothing to draw elsewhere.
-    let drawn = |layer: &LayerSpec| matches!(layer.surface, SurfaceSpec::Drawn(_));
-    if args.methods.is_empty() && subject.job().layers.iter().all(drawn) {
-        methods.insert(0, "crest");
-    }
+    fit_to_job(&mut methods, args, subject.job())?;
+    let models = models_of(&job, &subject, &input.models);
+    let mut seen = subject.outlines().clone();
+    let meshes = meshes_at(subject.job(), subject.grid().pitch_mm, &models, &mut seen)?;
     let pictures = methods.iter().filter(|_| args.each).map(|method| format!("{method}.png"));
     let names: Vec<String> =
         ["surfaces.html", "surfaces.png"].into_iter().map(str::to_owned).chain(pictures).collect();
@@ -127,7 +113,7 @@ pub(super) fn run(args: &Args) -> Result<(), Stop> {
     for method in methods {
         stages.enter(method);
         let begun = Instant::now();
-        let raised = compare::raise(&subject, method)?;
+        let raised = compare::raise(&subject, method, &meshes)?;
         seconds.push(begun.elapsed().as_secs_f64());
         compared.push(compare::measure(&subject, raised)?);
     }
@@ -170,6 +156,63 @@ pub(super) fn run(args: &Args) -> Result<(), Stop> {
         observe::complain(&timings);
     }
     Ok(())
+}
+
+/// The methods that the command line names, each once; all where it names none.
+fn asked_for(args: &Args) -> Vec<&str> {
+    let mut methods: Vec<&str> = Vec::new();
+    for method in &args.methods {
+        if !methods.contains(&method.as_str()) {
+            methods.push(method);
+        }
+    }
+    if methods.is_empty() {
+        methods.extend(SurfaceSpec::METHODS);
+    }
+    methods
+}
+
+/// Drawn crests and meshes are the job's own: there is nothing to draw elsewhere, and meshes have no other surface.
+fn fit_to_job(methods: &mut Vec<&str>, args: &Args, job: &Job) -> Result<(), Stop> {
+    let all_meshes = job.layers.iter().all(|layer| layer.mesh().is_some());
+    let drawn = |layer: &LayerSpec| matches!(layer.surface, SurfaceSpec::Drawn(_));
+    match methods.iter().copied().find(|method| *method != SurfaceSpec::MESHED) {
+        _ if args.methods.is_empty() && all_meshes => *methods = vec![SurfaceSpec::MESHED],
+        Some(other) if all_meshes => {
+            return Err(Stop::Usage(format!(
+                "every layer is a mesh, which has no surface by {other}; leave --method out, or name a layer of the \
+                 artwork by --layer"
+            )));
+        }
+        _ if args.methods.is_empty() && job.layers.iter().any(drawn) => {
+            methods.insert(0, SurfaceSpec::DRAWN);
+        }
+        _ => {}
+    }
+    Ok(())
+}
+
+/// The surfaces of the layers that are meshes, at a pitch; `outlines` get their figures. All other layers have none.
+fn meshes_at(
+    job: &Job,
+    pitch_mm: f64,
+    models: &[Model],
+    outlines: &mut Outlines,
+) -> Result<Vec<Vec<Surface>>, CarveError> {
+    let mut raised =
+        surface::Raised { surfaces: vec![Vec::new(); job.layers.len()], notes: Vec::new() };
+    model::raise(models, job, pitch_mm, outlines, &mut raised)?;
+    outlines.notes.extend(raised.notes);
+    Ok(raised.surfaces)
+}
+
+/// The models of the layers that were chosen.
+fn models_of(job: &Job, subject: &Subject, models: &[Model]) -> Vec<Model> {
+    let all: Vec<(&MeshSpec, &Model)> =
+        job.layers.iter().filter_map(LayerSpec::mesh).zip(models).collect();
+    let chosen = subject.job().layers.iter().filter_map(LayerSpec::mesh);
+    let model = |spec: &MeshSpec| all.iter().find(|one| one.0 == spec).map(|one| one.1.clone());
+    chosen.filter_map(model).collect()
 }
 
 /// No picture must take the place of the artwork that it shows.

@@ -238,7 +238,8 @@ impl Crest {
             let heights = ridge.heights(&skeleton.spine);
             let points = skeleton.spine.branches.iter().flat_map(|b| &b.points);
             for (point, &height) in points.zip(heights.branches.iter().flatten()) {
-                if point.half_width >= CREST_NODES * grid.pitch_mm {
+                // A mesh has the heights that it has.
+                if layer.mesh().is_none() && point.half_width >= CREST_NODES * grid.pitch_mm {
                     found.points.push((point.at, height));
                 }
                 found.widths.push((point.half_width, point.at));

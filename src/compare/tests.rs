@@ -24,7 +24,7 @@ fn bar(height_mm: f64) -> Subject {
 }
 
 fn by(subject: &Subject, method: &str) -> Compared {
-    measure(subject, raise(subject, method).unwrap()).unwrap()
+    measure(subject, raise(subject, method, &[]).unwrap()).unwrap()
 }
 
 /// Half as wide as 6 mm, 3 mm high: the parabola's slope at the outline is 2 * 3 / 6, and its second derivative
@@ -104,7 +104,7 @@ fn what_is_not_there_is_named_with_what_is() {
     let wanted = Wanted { pitch_mm: Some(least), ..Wanted::default() };
     assert!(Subject::of(&job, &outlines, &wanted).is_ok(), "{fine}");
     let subject = bar(1.0);
-    let lost = raise(&subject, "wax").unwrap_err().to_string();
+    let lost = raise(&subject, "wax", &[]).unwrap_err().to_string();
     assert!(lost.contains("'wax'") && lost.contains("ruled"), "{lost}");
 }
 

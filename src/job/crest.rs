@@ -5,10 +5,10 @@ use toml::de::DeValue;
 
 use super::draft::text_or_form;
 use super::error::JobError;
-use super::keys::CREST;
+use super::keys::{CREST, CREST_ENDS};
 use super::layer::read_selector;
 use super::reader::{Table, as_number};
-use super::surface::{CourseSpec, DrawnCrestSpec};
+use super::surface::{CourseSpec, CrestEnds, DrawnCrestSpec};
 
 /// Keys that only a crest by points, or only one along paths, makes use of.
 const OF_POINTS: [&str; 4] = ["through", "closed", "weights", "knots"];
@@ -53,11 +53,45 @@ fn read_crest(table: &Table<'_>) -> Result<DrawnCrestSpec, JobError> {
             return Err(table.impossible(name, message, "", help));
         }
     };
+    let ends = [CrestEnds::Natural, CrestEnds::Boundary, CrestEnds::Clamped][table.choice("ends")];
+    debug_assert_eq!(CREST_ENDS.len(), 3);
+    check_ends(table, &course, ends)?;
     Ok(DrawnCrestSpec {
         course,
         sharp: table.flag("sharp"),
         half_width_mm: table.number("half_width_mm"),
+        ends,
     })
+}
+
+/// Points and their knots leave room for what is said of the ends.
+fn check_ends(table: &Table<'_>, course: &CourseSpec, ends: CrestEnds) -> Result<(), JobError> {
+    let CourseSpec::Points { points, knots, closed, through, .. } = course else { return Ok(()) };
+    let refuse =
+        |message: &str, help: &str| Err(table.impossible("ends", message, "without effect", help));
+    if *closed && table.raw("ends").is_some() {
+        return refuse("a closed crest has no ends", "leave ends out, or take closed = true away");
+    }
+    let ended = [knots.first(), knots.last()].map(|d| d == Some(&0.0));
+    match ends {
+        CrestEnds::Boundary if ended.contains(&true) => refuse(
+            "knots of 0 clamp an end of this crest inside the outline",
+            "an end on the outline has a knot interval above 0; change knots or leave ends out",
+        ),
+        CrestEnds::Clamped if *through && ended.contains(&true) => refuse(
+            "knots of 0 clamp an end of this crest already",
+            "leave ends out, or give knots above 0 at both ends",
+        ),
+        CrestEnds::Clamped if !*through && !knots.is_empty() && ended.contains(&false) => refuse(
+            "the knots of these control points do not end with 0",
+            "begin and end knots with 0, or leave knots out: clamped ends then have 0, the others 1",
+        ),
+        CrestEnds::Clamped if !*through && points.len() < 4 => refuse(
+            "clamped ends need four control points or more",
+            "give more points, or leave ends out",
+        ),
+        _ => Ok(()),
+    }
 }
 
 fn heights(table: &Table<'_>) -> Result<Vec<[f64; 2]>, JobError> {

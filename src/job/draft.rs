@@ -41,6 +41,8 @@ pub struct Draft {
     pub(super) layers: Vec<LayerDraft>,
     pub(super) groups: Vec<GroupSpec>,
     pub(super) operations: Vec<OperationDraft>,
+    /// What was decided before.
+    pub(super) notes: Vec<String>,
 }
 
 /// The stock as far as the job tells.
@@ -144,6 +146,7 @@ fn read(
     let picture = artwork.is_picture();
     let draft = Draft {
         source: Source::default(),
+        notes: Vec::new(),
         title: top.text("title").map(str::to_owned),
         machine,
         strict: top.flag("strict"),

@@ -169,6 +169,8 @@ pub(super) const METHODS: &[&str] = &[
 ];
 /// The surface method over drawn ridge lines, which needs `[[layer.crest]]`.
 pub(super) const DRAWN: &str = "crest";
+/// The surface of a layer that is a mesh: no method of job files, but one to compare.
+pub(super) const MESHED: &str = "mesh";
 /// Names of [`super::Control`], in its order.
 pub(super) const CONTROLS: &[&str] = &["even", "split", "quad4", "quad6", "quads"];
 /// Ways to smooth an outline.
@@ -183,6 +185,8 @@ pub(super) const SMOOTHINGS: &[&str] = &[
 ];
 /// Names of [`crate::geom::curves::EndRule`], in its order.
 pub(super) const END_RULES: &[&str] = &["reflect", "lagrange"];
+/// Names of [`super::CrestEnds`], in its order.
+pub(super) const CREST_ENDS: &[&str] = &["natural", "boundary", "clamped"];
 /// Names of [`crate::geom::curves::Fit`], in its order.
 pub(super) const FITS: &[&str] = &["control", "through"];
 /// Names of [`crate::geom::curves::Spacing`], in its order.
@@ -757,6 +761,13 @@ pub(super) static CREST: Section = Section {
             "half the width of the strip that is level across the crest",
         ),
         key("sharp", Kind::Flag, Flag(false), "a sharp edge in place of the strip"),
+        key(
+            "ends",
+            Kind::Choice(CREST_ENDS),
+            Text("natural"),
+            "how it ends where no other crest is: natural, without curvature; clamped, as bent as the rest of it; boundary: \
+             on the outline, where it reaches it, at the outline's height",
+        ),
     ],
 };
 

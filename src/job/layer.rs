@@ -9,14 +9,14 @@ use super::crest::read_crests;
 use super::draft::{Draft, text_or_form};
 use super::edit::{EditsSpec, read_edits};
 use super::error::{JobError, Source, nearest, shown};
-use super::keys::{DRAWN, Key, LAYER, METHODS, PROFILES, SLOPE_CAP, SURFACE, rule};
+use super::keys::{DRAWN, Key, LAYER, MESHED, METHODS, PROFILES, SLOPE_CAP, SURFACE, rule};
 use super::mesh::{mesh_name, read_mesh};
 use super::reader::{Table, as_number};
 use super::settle::{TOUCHING_MM, round};
 use super::smooth::read_smooth;
 use super::surface::{
-    Control, CrestSpec, DrawnSpec, Join, Profile, Prune, Scheme, Significance, SkeletonSpec, Split,
-    SubdivisionSpec, SurfaceSpec,
+    Control, CourseSpec, CrestSpec, DrawnSpec, Join, Profile, Prune, Scheme, Significance,
+    SkeletonSpec, Split, SubdivisionSpec, SurfaceSpec,
 };
 use super::types::{Combine, Found, FoundLayer, LayerSpec, Rgb, Selector};
 use crate::geom::DVec2;
@@ -55,6 +55,7 @@ impl Draft {
         } else {
             for (index, layer) in self.layers.iter().enumerate() {
                 self.check_selector(index, &layer.spec, &found.selectors)?;
+                self.check_crests(index, &layer.spec, &found.paths)?;
             }
             self.layers.clone()
         };
@@ -95,6 +96,38 @@ impl Draft {
         let help = format!("the artwork has: {}", listed(there, &layer.select));
         let span = self.source.span_of(&[&format!("layer[{index}].select")]);
         Err(JobError::UnknownName(self.source.fault(span, &message, &label, &help)))
+    }
+
+    /// The crests of a layer name paths that are there.
+    fn check_crests(
+        &self,
+        index: usize,
+        layer: &LayerSpec,
+        there: &[Selector],
+    ) -> Result<(), JobError> {
+        let SurfaceSpec::Drawn(drawn) = &layer.surface else { return Ok(()) };
+        for (k, crest) in drawn.crests.iter().enumerate() {
+            let CourseSpec::Paths { select, .. } = &crest.course else { continue };
+            if *select == Selector::All || there.contains(select) {
+                continue;
+            }
+            let near = nearest_selector(select, there);
+            let message = format!(
+                "layer '{}', crest {}: no path in the artwork is {select}",
+                layer.name,
+                k + 1
+            );
+            let label = near.map_or(String::new(), |near| format!("did you mean \"{near}\"?"));
+            let help = match listed(there, select) {
+                names if names.is_empty() => {
+                    "the artwork names no path: give the line a label or an id".to_owned()
+                }
+                names => format!("the artwork has: {names}"),
+            };
+            let span = self.source.span_of(&[&format!("layer[{index}].crest[{k}].select")]);
+            return Err(JobError::UnknownName(self.source.fault(span, &message, &label, &help)));
+        }
+        Ok(())
     }
 
     /// A layer that stands by itself must not be asked to rise out of the stock, unless a later layer may
@@ -296,6 +329,12 @@ fn read_surface(layer: &Table<'_>) -> Result<SurfaceSpec, JobError> {
 impl SurfaceSpec {
     /// The methods as job files name them.
     pub const METHODS: &[&str] = METHODS;
+
+    /// The method over drawn ridge lines.
+    pub const DRAWN: &str = DRAWN;
+
+    /// What layers that are meshes have in place of a method.
+    pub const MESHED: &str = MESHED;
 
     /// The same surface by another method: skeleton, crest and cross-section are kept where the other method knows them,
     /// all else has its default. `None` when there is no such method.

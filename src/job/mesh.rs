@@ -3,10 +3,11 @@
 use toml::de::DeValue;
 
 use super::draft::{Draft, read_place, text_or_form};
-use super::error::JobError;
-use super::keys::{LAYER, MESH};
+use super::error::{JobError, Source};
+use super::keys::{LAYER, MESH, rule};
+use super::library::Library;
 use super::reader::Table;
-use super::settle::{Laid, stem};
+use super::settle::{Laid, round, stem};
 use super::surface::SurfaceSpec;
 use super::types::{Fit, Found, Job, LayerSpec, Place};
 use super::write::{Line, degrees, number, quoted};
@@ -180,6 +181,45 @@ impl Job {
 }
 
 impl Draft {
+    /// The job of a mesh without a file: one layer and defaults. `size`: that of its box, in units of the file, which are
+    /// taken for nothing: the longer side becomes as long as that of artwork without a size, or as the machine takes, and
+    /// what would be higher than the relief is deep is made flatter.
+    ///
+    /// # Errors
+    /// [`JobError`]: a size that is no number.
+    pub fn for_mesh(file: &str, size: DVec3, library: &Library) -> Result<Self, JobError> {
+        let defaults = Self::for_artwork(file, library);
+        let room = defaults.machine.travel_mm.truncate() - DVec2::splat(2.0 * rule::MARGIN_MM);
+        let most = room.min(DVec2::splat(rule::PIXEL_ART_MM)) / size.truncate();
+        // Tenths: a size that a person would write.
+        let width = (size.x * most.min_element() * 10.0).floor().max(1.0) / 10.0;
+        let unit = width / size.x;
+        let own = round(size.z * unit);
+        let height = own.min(defaults.depth_mm);
+        let text = format!(
+            "[[layer]]\nmesh = {{ file = {}, width_mm = {} }}\nheight_mm = {}\n",
+            quoted(file),
+            number(width),
+            number(height)
+        );
+        let none = |_: &str| Err(std::io::ErrorKind::NotFound.into());
+        let mut draft = Self::from_toml(&text, file, library, &none)?;
+        draft.source = Source::new(file, "");
+        let flatter = if own > height {
+            format!(" ({} mm by its own proportions)", number(own))
+        } else {
+            String::new()
+        };
+        draft.notes.push(format!(
+            "{file} gives no physical size: it becomes {} x {} mm and {} mm high{flatter}; mesh.width_mm and height_mm set \
+             others",
+            number(width),
+            round(size.y * unit),
+            number(height)
+        ));
+        Ok(draft)
+    }
+
     /// The meshes that its layers name, bottom to top, each with the index of its layer.
     pub fn meshes(&self) -> impl Iterator<Item = (usize, &MeshSpec)> {
         let layers = self.layers.iter().enumerate();

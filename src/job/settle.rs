@@ -60,7 +60,7 @@ impl Draft {
     /// [`JobError::Impossible`] when things do not fit together, [`JobError::UnknownName`] when a layer
     /// selects what the artwork does not have.
     pub fn settle(self, found: &Found) -> Result<Job, JobError> {
-        let mut notes = Vec::new();
+        let mut notes = self.notes.clone();
         let (unit_mm, size) = if self.artwork.is_given() {
             self.artwork_size(found, &mut notes)?
         } else {
@@ -152,7 +152,7 @@ impl Draft {
         let help = if self.source.is_written() || paths == ["artwork.file"] {
             help.to_owned()
         } else {
-            format!("{help}; `relievo new {}` writes a job file to do it in", self.artwork.file)
+            format!("{help}; `relievo new {}` writes a job file to do it in", self.source.file)
         };
         JobError::Impossible(self.source.fault(self.source.span_of(paths), message, "", &help))
     }

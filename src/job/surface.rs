@@ -130,6 +130,20 @@ pub struct DrawnCrestSpec {
     pub sharp: bool,
     /// Half the width of its strip, mm; `None`: by the room there is.
     pub half_width_mm: Option<f64>,
+    /// How it ends where it is open and no other crest is.
+    pub ends: CrestEnds,
+}
+
+/// How an open crest ends by itself.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum CrestEnds {
+    /// Inside the outline, without curvature. Knot intervals of 0 at an end clamp it all the same.
+    Natural,
+    /// On the outline, at its height and without curvature, where the crest reaches it; natural elsewhere.
+    Boundary,
+    /// Inside the outline, with the last knots in one place, so that it may be bent up to its end.
+    Clamped,
 }
 
 /// Where a ridge line runs, and how high.

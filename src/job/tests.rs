@@ -43,7 +43,14 @@ fn found() -> Found {
         Selector::Label("petals".to_owned()),
         Selector::Id("leaf".to_owned()),
     ];
-    Found { size: DVec2::new(200.0, 100.0), unit_mm: None, layers, selectors, meshes: vec![] }
+    let paths = vec![
+        Selector::Label("midrib".to_owned()),
+        Selector::Id("vein".to_owned()),
+        Selector::Stroke(Rgb(0, 0, 0)),
+        Selector::Label("a".to_owned()),
+    ];
+    let size = DVec2::new(200.0, 100.0);
+    Found { size, unit_mm: None, layers, selectors, paths, meshes: vec![] }
 }
 
 fn job(text: &str) -> Result<Job, JobError> {

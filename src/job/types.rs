@@ -62,6 +62,8 @@ pub struct Found {
     pub layers: Vec<FoundLayer>,
     /// Every selector that takes at least one shape ([`Selector::All`] aside).
     pub selectors: Vec<Selector>,
+    /// Every selector that names at least one path, be it to be carved or a line for crests: lines first.
+    pub paths: Vec<Selector>,
     /// The sizes of the meshes that the layers name, in their order, in units of their files.
     pub meshes: Vec<DVec3>,
 }

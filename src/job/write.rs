@@ -7,9 +7,9 @@ use super::edit::{edit_lines, rules_lines};
 use super::error::JobError;
 use super::group::{GroupSpec, users_of};
 use super::keys::{
-    ARTWORK, BACKGROUND, CONTROLS, CREST, CUTTER, EDIT, FOLLOWS, Fallback, GROUP, JOB, JOINS,
-    LAYER, MACHINE, MILLINGS, OPERATION, ORIGINS, PATTERNS, PROFILES, PRUNES, RELIEF, SAFETY,
-    SPLITS, STOCK, SURFACE, Section, TOLERANCE, TOP, TRACE, TRACE_METHODS, WOOD, rule,
+    ARTWORK, BACKGROUND, CONTROLS, CREST, CREST_ENDS, CUTTER, EDIT, FOLLOWS, Fallback, GROUP, JOB,
+    JOINS, LAYER, MACHINE, MILLINGS, OPERATION, ORIGINS, PATTERNS, PROFILES, PRUNES, RELIEF,
+    SAFETY, SPLITS, STOCK, SURFACE, Section, TOLERANCE, TOP, TRACE, TRACE_METHODS, WOOD, rule,
 };
 use super::library::Library;
 use super::mesh::mesh_lines;
@@ -107,30 +107,47 @@ pub fn template(artwork_file: &str, found: &Found, library: &Library) -> Result<
         Ok(job) => job,
         Err(error) => fitted(draft, found).ok_or(error)?,
     };
+    Ok(page_of(&job, found))
+}
+
+/// The same for a mesh: a layer of its own, without artwork. `found` holds its size.
+///
+/// # Errors
+/// As [`Draft::settle`].
+pub fn mesh_template(file: &str, found: &Found, library: &Library) -> Result<String, JobError> {
+    let size = found.meshes.first().copied().unwrap_or_default();
+    let job = Draft::for_mesh(file, size, library)?.settle(found)?;
+    Ok(page_of(&job, found))
+}
+
+/// A commented job file.
+fn page_of(job: &Job, found: &Found) -> String {
     let mut page = Page::default();
     page.text.push_str(
         "# A carving job for relievo. Lines behind a # are defaults: take the # away to change one.\n\
          # Lengths are mm, speeds mm/min, angles degrees. Check with: relievo check THIS-FILE\n\n",
     );
-    let mut top = top_lines(&job);
+    let mut top = top_lines(job);
     top.insert(1, ("machine", quoted(&job.machine.name)));
     page.section(&TOP, &top, &[]);
-    let mut stock = stock_lines(&job);
+    let mut stock = stock_lines(job);
     stock.push(("wood", quoted(&job.stock.wood.name)));
     page.section(&STOCK, &stock, &[]);
-    let mut artwork = artwork_lines(&job);
-    if job.artwork.fit == Fit::Own {
-        artwork.push(("width_mm", number(job.artwork_size_mm.x)));
-        page.section(&ARTWORK, &artwork, &["file"]);
-    } else {
-        page.section(&ARTWORK, &artwork, &["file", "width_mm"]);
+    if job.artwork.is_given() {
+        let mut artwork = artwork_lines(job);
+        if job.artwork.fit == Fit::Own {
+            artwork.push(("width_mm", number(job.artwork_size_mm.x)));
+            page.section(&ARTWORK, &artwork, &["file"]);
+        } else {
+            page.section(&ARTWORK, &artwork, &["file", "width_mm"]);
+        }
     }
     if job.artwork.is_picture() {
         page.section(&TRACE, &trace_lines(&job.artwork.trace), &[]);
     }
-    page.section(&RELIEF, &relief_lines(&job), &[]);
-    page.section(&TOLERANCE, &tolerance_lines(&job), &[]);
-    page.section(&SAFETY, &safety_lines(&job), &[]);
+    page.section(&RELIEF, &relief_lines(job), &[]);
+    page.section(&TOLERANCE, &tolerance_lines(job), &[]);
+    page.section(&SAFETY, &safety_lines(job), &[]);
     let mm = job.artwork_unit_mm;
     for (index, (layer, found)) in job.layers.iter().zip(&found.layers).enumerate() {
         let lines = layer_lines(layer, job.artwork.is_picture());
@@ -153,12 +170,15 @@ pub fn template(artwork_file: &str, found: &Found, library: &Library) -> Result<
             }
         }
     }
+    for layer in job.layers.iter().filter(|layer| layer.mesh().is_some()) {
+        page.section(&LAYER, &layer_lines(layer, false), &["name", "mesh", "height_mm"]);
+    }
     for operation in &job.operations {
         let mut lines = operation_lines(operation);
         lines.insert(1, ("cutter", quoted(&operation.cutter.name)));
         page.section(&OPERATION, &lines, &["kind", "cutter"]);
     }
-    Ok(page.text)
+    page.text
 }
 
 /// The job with the artwork as large as the machine takes it, in tenths of a mm.
@@ -480,6 +500,10 @@ fn crest_lines(crest: &DrawnCrestSpec) -> Vec<Line> {
     };
     lines.extend(crest.half_width_mm.map(|mm| ("half_width_mm", number(mm))));
     lines.push(("sharp", crest.sharp.to_string()));
+    let closed = matches!(crest.course, CourseSpec::Points { closed: true, .. });
+    if !closed {
+        lines.push(("ends", quoted(CREST_ENDS[crest.ends as usize])));
+    }
     debug_assert!(lines.iter().all(|(name, _)| CREST.key(name).is_some()));
     lines
 }

@@ -46,6 +46,8 @@ pub(super) fn about(method: &str) -> (&'static str, &'static str) {
         "kobbelt" => ("interpolating subdivision", "Kobbelt 1996"),
         "coons" => ("interpolating, with tangents", "Coons 1967; Fan, Li, Liu, Deng"),
         "doo-sabin" => ("approximating subdivision", "Doo, Sabin 1978"),
+        "crest" => ("over drawn ridge lines", "Zhang, Wang, Zheng 2003"),
+        "mesh" => ("the limit of a control mesh", "Catmull, Clark 1978"),
         _ => ("", ""),
     }
 }

@@ -16,6 +16,7 @@ mod arms;
 mod faults;
 mod fill;
 mod flanks;
+mod landing;
 mod line;
 mod membrane;
 mod raise;
@@ -61,6 +62,13 @@ pub struct DrawnSettings {
     pub chord_mm: f64,
 }
 
+impl DrawnSettings {
+    /// Height of a ring of the outline, mm; 0 is the outer one.
+    fn base_of(&self, ring: usize) -> f64 {
+        if ring == 0 { self.base_mm } else { self.hole_base_mm }
+    }
+}
+
 /// A control mesh over drawn crests.
 #[derive(Debug, Clone)]
 pub struct Control {
@@ -89,7 +97,7 @@ pub fn control_over(
 ) -> Result<Control, CrestFault> {
     let edge_mm = edge_of(region, settings);
     let lines = line::lines(crests, edge_mm)?;
-    line::check_inside(&lines, region)?;
+    line::check_inside(&lines, region, settings)?;
     let net = arms::net(&lines, edge_mm)?;
     let crests = net.arms.iter().map(|arm| arm.spline.traced(TRACED_ROUNDS)).collect();
     // Strips that nobody gave a width are made narrower until nothing meets.

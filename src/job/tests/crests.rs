@@ -31,8 +31,12 @@ fn crests_are_read_and_written() {
         (paths(Selector::Id("vein".into()), &[[0.0, 5.0], [1.0, 2.0]]), Some(0.5), false),
         (paths(Selector::Stroke(Rgb(0, 0, 0)), &[[0.0, 3.0]]), None, true),
     ];
-    let want =
-        want.map(|(course, half_width_mm, sharp)| DrawnCrestSpec { course, sharp, half_width_mm });
+    let want = want.map(|(course, half_width_mm, sharp)| DrawnCrestSpec {
+        course,
+        sharp,
+        half_width_mm,
+        ends: CrestEnds::Natural,
+    });
     assert_eq!(drawn.crests, want);
 
     let drawn = read("[[layer.crest]]\npoints = [[1, 2, 3], [40, 8.5, 6]]\n");
@@ -103,4 +107,53 @@ fn crests_that_do_not_go_together_are_refused_at_their_place() {
     );
     let error = job(&foreign).unwrap_err().to_string();
     assert!(error.contains("method \"crest\" does not use width_power"), "{error}");
+}
+
+/// A crest that names no path is refused where the job names it, with what is there.
+#[test]
+fn a_crest_that_names_no_path_is_refused_at_its_place() {
+    let kind = |e: &JobError| matches!(e, JobError::UnknownName(_));
+    let lost =
+        "[[layer.crest]]\nselect = \"label:midrib\"\n[[layer.crest]]\nselect = \"label:midrip\"\n";
+    let words =
+        ["crest 2: no path in the artwork is label:midrip", "did you mean \"label:midrib\"?"];
+    refused(&layer(lost), kind, (10, 10), &words);
+    let lost = "[[layer.crest]]\nselect = \"id:rib\"\n";
+    refused(&layer(lost), kind, (8, 10), &["the artwork has: id:vein"]);
+}
+
+/// How crests end: read, written back, and refused where it cannot be.
+#[test]
+fn ends_of_crests_are_read_and_written() {
+    for (word, ends) in [
+        ("natural", CrestEnds::Natural),
+        ("boundary", CrestEnds::Boundary),
+        ("clamped", CrestEnds::Clamped),
+    ] {
+        let along = format!("[[layer.crest]]\nselect = \"label:a\"\nends = \"{word}\"\n");
+        let by_points =
+            format!("[[layer.crest]]\npoints = [[1, 2, 3], [40, 8, 6]]\nends = \"{word}\"\n");
+        for lines in [along, by_points] {
+            assert_eq!(read(&lines).crests[0].ends, ends);
+        }
+    }
+    assert_eq!(read("[[layer.crest]]\nselect = \"label:a\"\n").crests[0].ends, CrestEnds::Natural);
+    let closed = "[[layer.crest]]\npoints = [[0, 0, 1], [9, 0, 1], [9, 9, 1]]\nclosed = true\n";
+    assert_eq!(read(closed).crests[0].ends, CrestEnds::Natural);
+    let kind = |e: &JobError| !matches!(e, JobError::Impossible(_));
+    let wrong = layer("[[layer.crest]]\nselect = \"label:a\"\nends = \"bounded\"\n");
+    refused(&wrong, kind, (9, 8), &["boundary", "natural", "clamped"]);
+    let kind = |e: &JobError| matches!(e, JobError::Impossible(_));
+    for (lines, words) in [
+        ("closed = true\nends = \"natural\"", "no ends"),
+        ("knots = [0, 1]\nends = \"boundary\"", "knots of 0 clamp an end"),
+        ("knots = [1, 0]\nends = \"clamped\"", "clamp an end of this crest already"),
+        ("knots = [1, 0]\nthrough = false\nends = \"clamped\"", "do not end with 0"),
+        ("through = false\nends = \"clamped\"", "four control points"),
+    ] {
+        let lines =
+            format!("[[layer.crest]]\npoints = [[0, 0, 1], [9, 0, 1], [9, 9, 1]]\n{lines}\n");
+        let line = 7 + lines.lines().position(|l| l.starts_with("ends")).unwrap();
+        refused(&layer(&lines), kind, (line, 8), &[words]);
+    }
 }

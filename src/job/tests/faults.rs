@@ -323,6 +323,7 @@ fn artwork_that_holds_nothing_is_refused() {
         unit_mm: None,
         layers: vec![],
         selectors: vec![],
+        paths: vec![],
         meshes: vec![],
     };
     let error = draft(&with("")).unwrap().settle(&nothing).unwrap_err();

@@ -7,8 +7,14 @@ use crate::geom::DVec3;
 fn mesh_job(text: &str) -> Result<Job, JobError> {
     let draft = draft(text)?;
     let meshes = draft.meshes().map(|_| DVec3::new(20.0, 10.0, 5.0)).collect();
-    let nothing =
-        Found { size: DVec2::ZERO, unit_mm: None, layers: vec![], selectors: vec![], meshes };
+    let nothing = Found {
+        size: DVec2::ZERO,
+        unit_mm: None,
+        layers: vec![],
+        selectors: vec![],
+        paths: vec![],
+        meshes,
+    };
     draft.settle(&nothing)
 }
 

@@ -202,7 +202,7 @@ fn any_found() -> impl Strategy<Value = Found> {
                 .map(|(select, name, area)| FoundLayer { select, name, area, size })
                 .collect();
             let selectors = layers.iter().map(|layer| layer.select.clone()).collect();
-            Found { size, unit_mm, layers, selectors, meshes: vec![] }
+            Found { size, unit_mm, layers, selectors, paths: vec![], meshes: vec![] }
         },
     )
 }

@@ -10,14 +10,13 @@
 //! Groups of crossing curves: Zhang, Wang and Zheng (2003).
 
 use super::CrestFault;
-use super::line::Line;
-use super::spline::{Condition, Spline, centripetal};
+use super::line::{Line, SAME_HEIGHT_MM};
+use super::spline::{Condition, Spline, centripetal, clamp};
 use crate::geom::{DVec2, DVec3, DVec4};
+use crate::job::CrestEnds;
 
 /// Crests that come this close, in edges of the mesh, meet; what is left of one beyond is dropped.
 const MEET: f64 = 0.35;
-/// Heights of crests that meet agree up to this, mm.
-const SAME_HEIGHT_MM: f64 = 0.02;
 /// The lines of a joint stand at this angle or more, degrees.
 const LEAST_ANGLE_DEG: f64 = 25.0;
 /// Arms leave the line they belong to by no more than this, degrees.
@@ -37,6 +36,8 @@ pub(super) enum End {
     Free,
     /// By itself, with its last knots in one place.
     Clamped,
+    /// On the outline, without curvature.
+    Landed,
     /// In a joint, as its arm of this number.
     Joint { joint: usize, slot: usize },
 }
@@ -100,6 +101,7 @@ pub(super) fn net(lines: &[Line], edge_mm: f64) -> Result<Net, CrestFault> {
     let meetings = meetings(lines, MEET * edge_mm);
     for meeting in &meetings {
         heights_agree(lines, meeting)?;
+        check_apart(lines, meeting, MEET * edge_mm)?;
     }
     let pieces = pieces(lines, &meetings, MEET * edge_mm);
     // Which ends of which pieces leave each joint.
@@ -234,6 +236,21 @@ fn heights_agree(lines: &[Line], meeting: &Meeting) -> Result<(), CrestFault> {
     Ok(())
 }
 
+/// Crests that end on the outline meet no other there.
+fn check_apart(lines: &[Line], meeting: &Meeting, near: f64) -> Result<(), CrestFault> {
+    let landed = |&&(line, s): &&(usize, f64)| {
+        let line: &Line = &lines[line];
+        let ends = [s, line.length() - s];
+        (0..2).any(|k| line.ends[k] == CrestEnds::Boundary && ends[k] <= near)
+    };
+    match meeting.cuts.iter().find(landed) {
+        Some(&(line, _)) => {
+            Err(CrestFault::NoRoom { crest: lines[line].name.clone(), at: meeting.at })
+        }
+        None => Ok(()),
+    }
+}
+
 /// The lines cut at their joints; ends that stick out of a joint by less than `near` go.
 fn pieces(lines: &[Line], meetings: &[Meeting], near: f64) -> Vec<Piece> {
     let mut pieces = Vec::new();
@@ -292,7 +309,9 @@ fn samples(line: &Line, piece: &Piece, edge_mm: f64) -> Vec<f64> {
     // The strip goes on beyond a free end by its last edge: a short one.
     if !line.closed {
         let ends = [(0, piece.from + LAST * step), (1, piece.to - LAST * step)];
-        out.extend(ends.iter().filter(|e| piece.joints[e.0].is_none()).map(|e| e.1));
+        let free =
+            |end: usize| piece.joints[end].is_none() && line.ends[end] != CrestEnds::Boundary;
+        out.extend(ends.iter().filter(|e| free(e.0)).map(|e| e.1));
     }
     out.sort_unstable_by(f64::total_cmp);
     out.dedup_by(|a, b| (*a - *b).abs() <= tiny.max(0.05 * step));
@@ -412,8 +431,12 @@ fn arm(
     let whole = piece.joints == [None, None];
     if let (true, Some(spline)) = (whole, &line.spline) {
         // Clamped ends have no natural one to go on from.
-        let clamped = |d: Option<&f64>| if d == Some(&0.0) { End::Clamped } else { End::Free };
-        let ends = [clamped(spline.spacings.first()), clamped(spline.spacings.last())];
+        let end = |d: Option<&f64>, end: usize| match line.ends[end] {
+            CrestEnds::Boundary => End::Landed,
+            _ if d == Some(&0.0) => End::Clamped,
+            _ => End::Free,
+        };
+        let ends = [end(spline.spacings.first(), 0), end(spline.spacings.last(), 1)];
         let spline = spline.refined_to(edge_mm).evened();
         return Arm { line: piece.line, spline, ends };
     }
@@ -427,7 +450,12 @@ fn arm(
     }
     let end = |k: usize| -> (Vec<DVec4>, End) {
         let Some(j) = piece.joints[k] else {
-            return (vec![line.at(piece.place(k, 0.0)).extend(1.0)], End::Free);
+            let end = match line.ends[k] {
+                CrestEnds::Natural => End::Free,
+                CrestEnds::Boundary => End::Landed,
+                CrestEnds::Clamped => End::Clamped,
+            };
+            return (vec![line.at(piece.place(k, 0.0)).extend(1.0)], end);
         };
         let (joint, slot) = (&joints[j], slots[k]);
         let mut points = vec![joint.at.extend(1.0)];
@@ -451,6 +479,11 @@ fn arm(
         }
         if matches!(finish, End::Joint { .. }) {
             spacings[n - 1 - k] = 1.0;
+        }
+    }
+    for (end, how) in [start, finish].into_iter().enumerate() {
+        if how == End::Clamped {
+            clamp(&mut conditions, &mut spacings, end);
         }
     }
     let spline = Spline::through(&conditions, spacings, false);

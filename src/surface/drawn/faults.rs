@@ -37,6 +37,60 @@ pub enum CrestFault {
         /// How far inside its ends have to lie, mm.
         room_mm: f64,
     },
+    /// A crest that shall end on the outline and does not reach it.
+    #[error(
+        "{crest} shall end on the outline, and is {gap_mm:.2} mm away from it at {at:.2}; draw it up to the outline or \
+         across it, or leave ends = \"boundary\" out"
+    )]
+    OffOutline {
+        /// The crest.
+        crest: String,
+        /// Its end, mm.
+        at: DVec2,
+        /// How far it is from the outline, mm.
+        gap_mm: f64,
+    },
+    /// A crest whose end on the outline has another height.
+    #[error(
+        "{crest} ends on the outline at {at:.2} with a height of {height_mm:.3} mm, where the outline is {base_mm:.3} mm \
+         high; end its heights with that, or let it end inside (ends = \"natural\")"
+    )]
+    EndHeight {
+        /// The crest.
+        crest: String,
+        /// Its end, mm.
+        at: DVec2,
+        /// Its height there, mm.
+        height_mm: f64,
+        /// The outline's, mm.
+        base_mm: f64,
+    },
+    /// A crest that hardly comes nearer to the outline where it ends on it.
+    #[error(
+        "{crest} ends on the outline at {at:.2} at an angle of {angle_deg:.0} degrees; let it meet the outline at \
+         {least_deg:.0} degrees or more, or let it end inside (ends = \"natural\")"
+    )]
+    AlongOutline {
+        /// The crest.
+        crest: String,
+        /// Its end, mm.
+        at: DVec2,
+        /// The angle, degrees.
+        angle_deg: f64,
+        /// What is needed, degrees.
+        least_deg: f64,
+    },
+    /// A strip that ends on a corner of the outline.
+    #[error(
+        "{crest} ends on a corner of the outline at {at:.2}, where a strip has no room; make it sharp, end it beside the \
+         corner, or let it end inside (ends = \"natural\")"
+    )]
+    AtCorner {
+        /// The crest.
+        crest: String,
+        /// Its end, mm.
+        at: DVec2,
+    },
     /// No crest in a region.
     #[error(
         "no crest lies in the part at {at:.2}; draw one there, or put that part into a layer of its own"

@@ -6,6 +6,7 @@
 //! ```
 
 use super::flanks::Flanks;
+use super::landing::Dock;
 use super::spline::{Condition, Spline};
 use super::strips::Strips;
 use super::{CrestFault, DrawnSettings};
@@ -23,6 +24,8 @@ const CLEAR: f64 = 0.6;
 const LEAST_SQUARE_DEG: f64 = 65.0;
 /// Halvings of the edges of an outline that its B-spline does not follow.
 const FINER: u32 = 5;
+/// A corner of a face whose sides span less than this part of a square has no side to stand on.
+const FLAT: f64 = 1e-9;
 /// Least vertices of a ring.
 const LEAST_VERTICES: f64 = 8.0;
 
@@ -30,7 +33,8 @@ const LEAST_VERTICES: f64 = 8.0;
 struct Rim {
     points: Vec<DVec2>,
     corner: Vec<bool>,
-    base_mm: f64,
+    /// The vertex of a crest that a point is.
+    known: Vec<Option<u32>>,
 }
 
 /// The mesh over a region with these strips, and what its heights follow from.
@@ -40,18 +44,31 @@ pub(super) fn fill(
     edge_mm: f64,
     settings: &DrawnSettings,
 ) -> Result<(SpacedMesh, Flanks), CrestFault> {
-    let bases = std::iter::once(settings.base_mm).chain(std::iter::repeat(settings.hole_base_mm));
-    let rims: Vec<Rim> =
-        region.rings().zip(bases).map(|(ring, base)| rim(ring, base, edge_mm, settings)).collect();
+    let rims: Vec<Rim> = region
+        .rings()
+        .enumerate()
+        .map(|(k, ring)| Ok(rim(ring, &docks_of(strips, k, region)?, strips, edge_mm, settings)))
+        .collect::<Result<_, CrestFault>>()?;
     let mut plan: Vec<DVec2> = (0..strips.vertices.len() as u32).map(|v| strips.plan(v)).collect();
     let crest = plan.len();
     let mut outline: Vec<[u32; 2]> = Vec::new();
     let mut corner = vec![false; crest];
-    for rim in &rims {
-        let (first, n) = (plan.len() as u32, rim.points.len() as u32);
-        plan.extend(&rim.points);
-        corner.extend(&rim.corner);
-        outline.extend((0..n).map(|k| [first + k, first + (k + 1) % n]));
+    let mut base = vec![settings.base_mm; crest];
+    for (ring, rim) in rims.iter().enumerate() {
+        let mut vertices: Vec<u32> = Vec::with_capacity(rim.points.len());
+        for (k, &p) in rim.points.iter().enumerate() {
+            if let Some(v) = rim.known[k] {
+                (corner[v as usize], base[v as usize]) = (true, settings.base_of(ring));
+                vertices.push(v);
+            } else {
+                vertices.push(plan.len() as u32);
+                plan.push(p);
+                corner.push(rim.corner[k]);
+                base.push(settings.base_of(ring));
+            }
+        }
+        let next = vertices.iter().cycle().skip(1);
+        outline.extend(vertices.iter().zip(next).map(|(&a, &b)| [a, b]));
     }
     for &v in &strips.corners {
         corner[v as usize] = true;
@@ -59,9 +76,10 @@ pub(super) fn fill(
     let mut fixed = outline.clone();
     let sides = |quad: &[u32; 4]| [0, 1, 2, 3].map(|k| [quad[k], quad[(k + 1) % 4]]);
     let walls: HashSet<[u32; 2]> = strips.quads.iter().flat_map(sides).collect();
-    let mut known: HashSet<[u32; 2]> = HashSet::new();
+    let either = |edge: &[u32; 2]| [edge[0].min(edge[1]), edge[0].max(edge[1])];
+    let mut known: HashSet<[u32; 2]> = outline.iter().map(either).collect();
     for edge in strips.quads.iter().flat_map(sides).chain(strips.creases.iter().copied()) {
-        if known.insert([edge[0].min(edge[1]), edge[0].max(edge[1])]) {
+        if known.insert(either(&edge)) {
             fixed.push(edge);
         }
     }
@@ -72,10 +90,7 @@ pub(super) fn fill(
         strips.creases.iter().flat_map(|&[a, b]| [[a, b], [b, a]]).collect();
     let faces = paired(&plan, &triangles, &creases);
 
-    let mut base = vec![settings.base_mm; crest];
-    base.extend(rims.iter().flat_map(|rim| rim.points.iter().map(|_| rim.base_mm)));
     base.resize(plan.len(), settings.base_mm);
-
     let mut mesh = PolyMesh::new();
     for v in 0..plan.len() {
         let at = match strips.vertices.get(v) {
@@ -100,24 +115,92 @@ pub(super) fn fill(
     for &([from, to], d) in &strips.beyond {
         out.set_beyond(from, to, d);
     }
+    check_upright(&out, strips)?;
     let mut flanks = Flanks::new(settings.profile, strips.chains.clone(), base);
     let at = region.bounds().center();
     flanks.raise(&mut out).map_err(|why| CrestFault::Mesh { at, why })?;
     Ok((out, flanks))
 }
 
-/// Control points whose cubic B-spline goes through points of a ring, so close that it follows the ring.
-fn rim(ring: &[DVec2], base_mm: f64, edge_mm: f64, settings: &DrawnSettings) -> Rim {
+/// Every face runs counter-clockwise in plan at each of its corners, by more than rounding may turn over.
+fn check_upright(mesh: &SpacedMesh, strips: &Strips) -> Result<(), CrestFault> {
+    let at = |v: u32| mesh.place(v).truncate();
+    for face in mesh.mesh().faces() {
+        let n = face.len();
+        let is_bent = |k: usize| {
+            let [a, b, c] = [0, 1, 2].map(|i| at(face[(k + i) % n]));
+            let (one, two) = (b - a, c - b);
+            one.perp_dot(two) <= FLAT * one.length_squared().max(two.length_squared())
+        };
+        if (0..n).any(is_bent) {
+            let of_crest = |v: &u32| Some((*v, strips.owner.get(*v as usize)?.clone()));
+            return Err(match face.iter().find_map(of_crest) {
+                Some((v, crest)) => CrestFault::NoRoom { crest, at: at(v) },
+                None => CrestFault::Outline { at: at(face[0]) },
+            });
+        }
+    }
+    Ok(())
+}
+
+/// The crests that end on a ring, in its order.
+fn docks_of<'a>(
+    strips: &'a Strips,
+    ring: usize,
+    region: &Region,
+) -> Result<Vec<&'a Dock>, CrestFault> {
+    let mut docks: Vec<&Dock> = strips.docks.iter().filter(|dock| dock.ring == ring).collect();
+    docks.sort_by(|a, b| a.place.total_cmp(&b.place));
+    let Some(points) = region.rings().nth(ring).filter(|_| docks.len() > 1) else {
+        return Ok(docks);
+    };
+    let curve = Curve::new(points.to_vec(), f64::INFINITY);
+    for (k, dock) in docks.iter().enumerate() {
+        let next = docks[(k + 1) % docks.len()];
+        if dock.covers(next.span[0], &curve) || next.covers(dock.span[1], &curve) {
+            let v = next.vertices[0];
+            let crest = strips.owner[v as usize].clone();
+            return Err(CrestFault::NoRoom { crest, at: strips.plan(v) });
+        }
+    }
+    Ok(docks)
+}
+
+/// Control points whose cubic B-spline goes through points of a ring, so close that it follows the ring. Vertices of crests
+/// that end on it are among them, as corners.
+fn rim(
+    ring: &[DVec2],
+    docks: &[&Dock],
+    strips: &Strips,
+    edge_mm: f64,
+    settings: &DrawnSettings,
+) -> Rim {
     let curve = Curve::new(ring.to_vec(), settings.corner_rad);
     let segments = Segments::of_rings([ring]);
+    let docked = |s: f64| docks.iter().any(|dock| dock.covers(s, &curve));
+    let mut stops: Vec<f64> = curve.stops().iter().copied().filter(|s| !docked(*s)).collect();
+    let own = stops.clone();
+    stops.extend(docks.iter().flat_map(|dock| dock.span));
+    stops.sort_unstable_by(f64::total_cmp);
+    stops.dedup();
     let mut edge = edge_mm.min(curve.length() / LEAST_VERTICES);
     for round in 0.. {
-        let places = resampled(&curve, curve.stops(), edge);
-        let points: Vec<DVec2> = places.iter().map(|&s| curve.at(s)).collect();
-        let corner: Vec<bool> = places.iter().map(|s| curve.stops().contains(s)).collect();
+        let places = resampled(&curve, &stops, edge).into_iter().filter(|s| !docked(*s));
+        let mut all: Vec<(f64, DVec2, bool, Option<u32>)> =
+            places.map(|s| (s, curve.at(s), own.contains(&s), None)).collect();
+        for dock in docks {
+            let places = [dock.span[0], dock.place, dock.span[1]];
+            let places = if dock.vertices.len() == 1 { &places[1..2] } else { &places[..] };
+            let known = places.iter().zip(&dock.vertices);
+            all.extend(known.map(|(&s, &v)| (curve.wrapped(s), strips.plan(v), true, Some(v))));
+        }
+        all.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let points: Vec<DVec2> = all.iter().map(|a| a.1).collect();
+        let corner: Vec<bool> = all.iter().map(|a| a.2).collect();
         let (points, far) = interpolating(&points, &corner, &segments);
         if far <= settings.chord_mm || round == FINER {
-            return Rim { points, corner, base_mm };
+            let known = all.iter().map(|a| a.3).collect();
+            return Rim { points, corner, known };
         }
         edge *= 0.5;
     }
@@ -230,6 +313,12 @@ fn triangles(
     if let Some(e) = fixed.iter().find(lost) {
         return Err(blame(*e));
     }
+    // Where a strip ends on the outline both sides are known: the strip's own faces, and what lies outside.
+    let ends: HashSet<[u32; 2]> = outline
+        .iter()
+        .flat_map(|&[a, b]| [[a, b], [b, a]])
+        .filter(|&[a, b]| walls.contains(&[a, b]) || walls.contains(&[b, a]))
+        .collect();
     let outer: HashSet<[u32; 2]> = outline.iter().copied().collect();
     let blocked =
         |[a, b]: [u32; 2]| [[a, b], [b, a]].iter().any(|e| outer.contains(e) || walls.contains(e));
@@ -239,7 +328,8 @@ fn triangles(
         let v = face.vertices().map(|v| v.index() as u32);
         let starts = |k: usize| {
             let e = [v[k], v[(k + 1) % 3]];
-            outer.contains(&e) || (walls.contains(&[e[1], e[0]]) && !walls.contains(&e))
+            !ends.contains(&e)
+                && (outer.contains(&e) || (walls.contains(&[e[1], e[0]]) && !walls.contains(&e)))
         };
         if (0..3).any(starts) && !inside[face.index()] {
             inside[face.index()] = true;

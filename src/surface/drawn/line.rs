@@ -1,14 +1,16 @@
 //! Crests as they are drawn -> polylines with heights.
 
-use super::CrestFault;
-use super::spline::{Condition, Spline, centripetal};
+use super::landing::{Shore, reach_mm};
+use super::spline::{Condition, Spline, centripetal, clamp};
+use super::{CrestFault, DrawnSettings};
 use crate::geom::{DVec2, DVec3, DVec4, contains_even_odd};
+use crate::job::CrestEnds;
 use crate::outline::Region;
 
 /// Points of a polyline that stands for a spline lie this much closer than the edges of the mesh.
 const FINE: f64 = 8.0;
-/// Ends of crests keep this distance from the outline, in edges of the mesh, where nothing else limits them.
-const ROOM: f64 = 0.02;
+/// Heights of crests that meet each other or the outline agree up to this, mm.
+pub(super) const SAME_HEIGHT_MM: f64 = 0.02;
 
 /// A ridge line that the relief has to hold.
 #[derive(Debug, Clone, PartialEq)]
@@ -23,6 +25,9 @@ pub struct DrawnCrest {
     pub sharp: bool,
     /// Half the width of its strip, mm; `None`: by the room there is.
     pub half_width_mm: Option<f64>,
+    /// How it starts and ends where it is open and meets no other; knot intervals of 0 at an end clamp it all the same.
+    /// [`CrestEnds::Boundary`]: that end lies on the outline, as high as it.
+    pub ends: [CrestEnds; 2],
 }
 
 /// Where a crest runs, and how high.
@@ -170,6 +175,7 @@ pub(super) struct Line {
     pub(super) spline: Option<Spline>,
     /// It has weights or knots of its own.
     pub(super) own_knots: bool,
+    pub(super) ends: [CrestEnds; 2],
 }
 
 impl Line {
@@ -210,9 +216,11 @@ fn line(crest: &DrawnCrest, edge_mm: f64) -> Result<Line, CrestFault> {
     let (mut points, passed, drawn) = match (&crest.course, &spline) {
         (Course::Path { points, passed }, _) => (points.clone(), passed.clone(), true),
         (Course::Through { points, .. }, Some(spline)) => {
-            // Every halving doubles the index of a point of the polygon.
+            // Every halving doubles the number of edges before a point of the polygon; a clamped end has one more, which
+            // stays whole.
             let rounds = rounds(spline, edge_mm);
-            let passed = (0..points.len()).map(|k| k << rounds).collect();
+            let before = usize::from(!crest.closed && crest.ends[0] == CrestEnds::Clamped);
+            let passed = (0..points.len()).map(|k| (k << rounds) + before).collect();
             (spline.traced(rounds), passed, false)
         }
         (_, Some(spline)) => (spline.traced(rounds(spline, edge_mm)), Vec::new(), false),
@@ -247,6 +255,7 @@ fn line(crest: &DrawnCrest, edge_mm: f64) -> Result<Line, CrestFault> {
         half_width_mm: crest.half_width_mm,
         spline,
         own_knots,
+        ends: if crest.closed { [CrestEnds::Natural; 2] } else { crest.ends },
     })
 }
 
@@ -308,11 +317,23 @@ fn spline(crest: &DrawnCrest) -> Result<Spline, CrestFault> {
     if !knots.is_empty() && !knots.iter().any(|d| *d > 0.0) {
         return bad("a list of knots without an interval".to_owned(), "give intervals above 0");
     }
-    let spacings = match (knots.is_empty(), through) {
+    let clamped = [0, 1].map(|end| !crest.closed && crest.ends[end] == CrestEnds::Clamped);
+    let mut spacings = match (knots.is_empty(), through) {
         (false, _) => knots.clone(),
         (true, true) => centripetal(points, crest.closed),
         (true, false) => vec![1.0; edges],
     };
+    if !through && knots.is_empty() {
+        for (end, k) in [(0, 0), (1, edges - 1)] {
+            spacings[k] = if clamped[end] { 0.0 } else { spacings[k] };
+        }
+    }
+    if !spacings.iter().any(|d| *d > 0.0) {
+        return bad(
+            "so few control points".to_owned(),
+            "give four or more, or leave clamped ends out",
+        );
+    }
     let weight = |k: usize| weights.get(k).copied().unwrap_or(1.0);
     let homogeneous: Vec<DVec4> =
         points.iter().enumerate().map(|(k, p)| p.extend(1.0) * weight(k)).collect();
@@ -321,7 +342,11 @@ fn spline(crest: &DrawnCrest) -> Result<Spline, CrestFault> {
         let condition = |(k, p): (usize, &DVec4)| {
             if end(k) { Condition::At(*p) } else { Condition::Through(*p) }
         };
-        let conditions: Vec<Condition> = homogeneous.iter().enumerate().map(condition).collect();
+        let mut conditions: Vec<Condition> =
+            homogeneous.iter().enumerate().map(condition).collect();
+        for end in (0..2).filter(|end| clamped[*end]) {
+            clamp(&mut conditions, &mut spacings, end);
+        }
         Spline::through(&conditions, spacings, crest.closed)
     } else {
         Spline { points: homogeneous, spacings, closed: crest.closed }
@@ -336,16 +361,33 @@ fn spline(crest: &DrawnCrest) -> Result<Spline, CrestFault> {
     Ok(spline.evened())
 }
 
-/// Crests lie inside the region.
-pub(super) fn check_inside(lines: &[Line], region: &Region) -> Result<(), CrestFault> {
+/// Crests lie inside the region, but for ends on its outline, which are as high as that.
+pub(super) fn check_inside(
+    lines: &[Line],
+    region: &Region,
+    settings: &DrawnSettings,
+) -> Result<(), CrestFault> {
+    let shore = Shore::of(region);
     for line in lines {
+        let landed = line.ends.map(|end| end == CrestEnds::Boundary);
+        for (end, point) in [(0, line.points.first()), (1, line.points.last())] {
+            if let (true, Some(point)) = (landed[end], point) {
+                let landing = shore.landing(&line.name, point.truncate())?;
+                let base_mm = settings.base_of(landing.ring);
+                if (point.z - base_mm).abs() > SAME_HEIGHT_MM {
+                    let (crest, at, height_mm) = (line.name.clone(), landing.at, point.z);
+                    return Err(CrestFault::EndHeight { crest, at, height_mm, base_mm });
+                }
+            }
+        }
+        let inner = usize::from(landed[0])..line.points.len() - usize::from(landed[1]);
         let outside = |p: &&DVec3| !contains_even_odd(region.rings(), p.truncate());
-        if let Some(p) = line.points.iter().find(outside) {
-            let room_mm = ROOM * region.area().max(0.0).sqrt();
+        if let Some(p) = line.points[inner].iter().find(outside) {
+            let at = p.truncate();
             return Err(CrestFault::Outside {
                 crest: line.name.clone(),
-                at: p.truncate(),
-                room_mm,
+                at,
+                room_mm: reach_mm(region),
             });
         }
     }

@@ -164,6 +164,33 @@ pub(super) fn centripetal(points: &[DVec3], closed: bool) -> Vec<f64> {
     out
 }
 
+/// Puts all knots of an open end in one place: an edge without a spacing, and after it a control point on the tangent of the
+/// parabola through the first three points (Bessel's end; de Boor 1978).
+pub(super) fn clamp(conditions: &mut Vec<Condition>, spacings: &mut Vec<f64>, end: usize) {
+    let turn = |conditions: &mut Vec<Condition>, spacings: &mut Vec<f64>| {
+        if end == 1 {
+            conditions.reverse();
+            spacings.reverse();
+        }
+    };
+    turn(conditions, spacings);
+    let at = |k: usize| match conditions[k] {
+        Condition::Through(p) | Condition::At(p) => p,
+    };
+    let rise = |k: usize| (at(k + 1) - at(k)) / spacings[k];
+    let d = spacings[0];
+    if d > 0.0 {
+        let slope = match spacings.get(1) {
+            Some(&next) if next > 0.0 => rise(0) + (rise(0) - rise(1)) * (d / (d + next)),
+            _ => rise(0),
+        };
+        let handle = at(0) + slope * (d / 3.0);
+        conditions.insert(1, Condition::At(handle));
+        spacings.insert(0, 0.0);
+    }
+    turn(conditions, spacings);
+}
+
 /// Solves a tridiagonal system whose rows have no negative entry (Thomas): totally positive, so that it needs no pivots.
 fn tridiagonal(rows: &[([f64; 3], DVec4)]) -> Vec<DVec4> {
     let n = rows.len();
@@ -278,5 +305,39 @@ mod tests {
         assert_eq!(centripetal(&points, true).len(), 3);
         let spline = Spline { points: Vec::new(), spacings: vec![0.0, 2.0, 4.0], closed: false };
         assert_eq!(spline.evened().spacings, [0.0, 2.0 / 3.0, 4.0 / 3.0]);
+    }
+
+    /// A curve with clamped ends through points of a parabola at its own knots is that parabola; a natural one is not.
+    #[test]
+    fn clamped_ends_reproduce_a_parabola() {
+        let places = [0.0, 1.0, 2.5, 4.0, 4.5];
+        let at = |t: f64| DVec3::new(2.0 * t, t * t - 3.0 * t, 1.0 + t - 0.2 * t * t);
+        let conditions = |k: usize| {
+            let p = at(places[k]).extend(1.0);
+            if k == 0 || k == 4 { Condition::At(p) } else { Condition::Through(p) }
+        };
+        let spacings: Vec<f64> = places.windows(2).map(|w| w[1] - w[0]).collect();
+        let off = |p: &DVec3| p.distance(at(0.5 * p.x));
+        let natural: Vec<Condition> = (0..5).map(conditions).collect();
+        let (mut clamped, mut knots) = (natural.clone(), spacings.clone());
+        for end in [0, 1] {
+            clamp(&mut clamped, &mut knots, end);
+        }
+        assert_eq!(knots, [0.0, 1.0, 1.5, 1.5, 0.5, 0.0]);
+        let worst = |spline: &Spline| spline.traced(4).iter().map(off).fold(0.0, f64::max);
+        let far = worst(&Spline::through(&clamped, knots, false));
+        assert!(far < 1e-12, "{far}");
+        assert!(worst(&Spline::through(&natural, spacings, false)) > 0.01);
+        let mut two = vec![conditions(0), conditions(4)];
+        let mut knots = vec![2.0];
+        for end in [0, 1] {
+            clamp(&mut two, &mut knots, end);
+        }
+        let straight = Spline::through(&two, knots, false);
+        let (a, b) = (at(0.0), at(4.5));
+        for p in straight.traced(3) {
+            let t = (p.x - a.x) / (b.x - a.x);
+            assert!(p.distance(a.lerp(b, t)) < 1e-12);
+        }
     }
 }

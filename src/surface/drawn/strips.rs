@@ -10,6 +10,7 @@
 
 use super::arms::{Arm, End, Joint, Net};
 use super::flanks::Chain;
+use super::landing::{Dock, Shore};
 use super::line::Line;
 use super::{CrestFault, DrawnSettings};
 use crate::geom::{DVec2, DVec3, DVec4, distance_to_segment, orient};
@@ -43,6 +44,8 @@ pub(super) struct Strips {
     pub(super) corners: Vec<u32>,
     /// The centres of the strips and the creases.
     pub(super) chains: Vec<Chain>,
+    /// Where they end on the outline.
+    pub(super) docks: Vec<Dock>,
 }
 
 impl Strips {
@@ -83,6 +86,7 @@ type Extended = (Vec<DVec4>, Vec<f64>, [f64; 2]);
 struct Widths<'a> {
     lines: &'a [Line],
     outline: Segments,
+    shore: Shore,
     part: f64,
     settings: &'a DrawnSettings,
 }
@@ -121,13 +125,14 @@ pub(super) fn strips(
     part: f64,
     settings: &DrawnSettings,
 ) -> Result<Strips, CrestFault> {
-    let widths = Widths { lines, outline: Segments::of_rings(region.rings()), part, settings };
+    let (outline, shore) = (Segments::of_rings(region.rings()), Shore::of(region));
+    let widths = Widths { lines, outline, shore, part, settings };
     let mut out = Strips::default();
     let rounds: Vec<Round> =
         net.joints.iter().map(|joint| out.round(joint, lines, &widths)).collect();
     for arm in &net.arms {
         let mut vertices = if lines[arm.line].sharp {
-            out.crease(arm, &lines[arm.line], &rounds)?
+            out.crease(arm, &lines[arm.line], &rounds, &widths)?
         } else {
             out.strip(arm, lines, &rounds, &widths)?
         };
@@ -206,18 +211,27 @@ impl Strips {
                 let at = if end == 0 { 0 } else { n };
                 points.insert(at, beyond);
                 d.insert(if end == 0 { 0 } else { d.len() }, own);
+            } else if arm.ends[end] == End::Landed {
+                // Beyond the outline lies the mirror image.
+                on[end] = if end == 0 { d[0] } else { d[d.len() - 1] };
             }
         }
         Ok((points, d, on))
     }
 
     /// Lays a crease and gives its vertices.
-    fn crease(&mut self, arm: &Arm, line: &Line, rounds: &[Round]) -> Result<Vec<u32>, CrestFault> {
+    fn crease(
+        &mut self,
+        arm: &Arm,
+        line: &Line,
+        rounds: &[Round],
+        widths: &Widths<'_>,
+    ) -> Result<Vec<u32>, CrestFault> {
         let (points, d, on) = Self::extended(arm, &line.name)?;
         let n = points.len();
         let joint = |end: End| match end {
             End::Joint { joint, .. } => Some(rounds[joint].centre),
-            End::Free | End::Clamped => None,
+            End::Free | End::Clamped | End::Landed => None,
         };
         let known = [joint(arm.ends[0]), joint(arm.ends[1])];
         let vertices: Vec<u32> = (0..n)
@@ -239,9 +253,18 @@ impl Strips {
             if arm.ends[1] == End::Free {
                 self.tell(vertices[n - 1], vertices[n - 2], on[1]);
             }
-            // A clamped end is a vertex of the crease and has to stay.
-            let ends = [(0, vertices[0]), (1, vertices[n - 1])];
-            self.corners.extend(ends.iter().filter(|e| arm.ends[e.0] == End::Clamped).map(|e| e.1));
+            // A clamped end is a vertex of the crease and has to stay, and so has one on the outline.
+            for (end, v) in [(0, vertices[0]), (1, vertices[n - 1])] {
+                match arm.ends[end] {
+                    End::Clamped => self.corners.push(v),
+                    End::Landed => {
+                        let landing = widths.shore.landing(&line.name, self.plan(v))?;
+                        let (ring, place) = (landing.ring, landing.place);
+                        self.docks.push(Dock { ring, span: [place; 2], place, vertices: vec![v] });
+                    }
+                    End::Free | End::Joint { .. } => {}
+                }
+            }
         }
         Ok(vertices)
     }
@@ -273,6 +296,12 @@ impl Strips {
             on[1] = spacings.pop().unwrap_or(1.0);
         }
         for k in first..last.max(first) {
+            if let Some(end) = [0, 1].into_iter().find(|&end| {
+                arm.ends[end] == End::Landed && !closed && k == if end == 0 { 0 } else { n - 1 }
+            }) {
+                columns.push(self.landed(end, k, &points, lines, arm.line, widths)?);
+                continue;
+            }
             let (before, after) = if closed {
                 (plan[(k + n - 1) % n], plan[(k + 1) % n])
             } else {
@@ -299,10 +328,35 @@ impl Strips {
         self.lay(&columns, &spacings, closed, on);
         let centre = |end: End| match end {
             End::Joint { joint, .. } => Some(rounds[joint].centre),
-            End::Free | End::Clamped => None,
+            End::Free | End::Clamped | End::Landed => None,
         };
         let inner = columns.iter().map(|column| column[1]);
         Ok(centre(arm.ends[0]).into_iter().chain(inner).chain(centre(arm.ends[1])).collect())
+    }
+
+    /// The column of a strip on the outline: right, crest, left.
+    fn landed(
+        &mut self,
+        end: usize,
+        k: usize,
+        points: &[DVec4],
+        lines: &[Line],
+        line: usize,
+        widths: &Widths<'_>,
+    ) -> Result<[u32; 3], CrestFault> {
+        let (name, settings) = (&lines[line].name, widths.settings);
+        let plan = |p: DVec4| p.truncate().truncate() / p.w;
+        let landing = widths.shore.landing(name, plan(points[k]))?;
+        let outwards = plan(points[k]) - plan(points[if end == 0 { 1 } else { k - 1 }]);
+        let width = widths.at(line, landing.at);
+        let (along, span) =
+            widths.shore.column(name, &landing, outwards, width, settings.chord_mm)?;
+        let aside = along.extend(0.0).extend(0.0) * points[k].w;
+        let row = [points[k] - aside, points[k], points[k] + aside].map(|p| self.add(p, name));
+        let (ring, place) = (landing.ring, landing.place);
+        self.docks.push(Dock { ring, place, span, vertices: row.to_vec() });
+        // Along the ring the inside lies to the left: so does the crest's left where it arrives.
+        Ok(if end == 0 { [row[2], row[1], row[0]] } else { row })
     }
 
     /// Quadrilaterals, spacings and the table of a strip's columns; `on` are the spacings before and after its rows.

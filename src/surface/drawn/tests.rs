@@ -2,8 +2,11 @@
 
 use super::*;
 use crate::geom::{DVec2, Grid, orient};
+use crate::job::CrestEnds;
 use crate::relief::rasterise;
 use std::f64::consts::TAU;
+
+mod ends;
 
 fn ellipse(a: f64, b: f64, n: usize) -> Region {
     let at = |k: usize| {
@@ -27,7 +30,14 @@ fn settings() -> DrawnSettings {
 
 fn crest(course: Course) -> DrawnCrest {
     let name = "crest 1".to_owned();
-    DrawnCrest { name, course, closed: false, sharp: false, half_width_mm: None }
+    DrawnCrest {
+        name,
+        course,
+        closed: false,
+        sharp: false,
+        half_width_mm: None,
+        ends: [CrestEnds::Natural; 2],
+    }
 }
 
 /// A path through some points, drawn as a fine polyline by a circle-like wave.

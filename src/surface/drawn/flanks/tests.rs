@@ -3,6 +3,7 @@
 use super::super::{Course, DrawnCrest, DrawnSettings, drawn_surface};
 use super::*;
 use crate::geom::{DVec2, DVec3, Grid, distance_to_segment};
+use crate::job::CrestEnds;
 use crate::outline::Region;
 use crate::relief::rasterise;
 use crate::surface::subdivide::PolyMesh;
@@ -20,7 +21,14 @@ fn level(points: &[[f64; 2]], closed: bool) -> DrawnCrest {
     let points = points.iter().map(|p| DVec3::new(p[0], p[1], HEIGHT_MM)).collect();
     let course = Course::Through { points, weights: vec![], knots: vec![] };
     let name = "crest 1".to_owned();
-    DrawnCrest { name, course, closed, sharp: true, half_width_mm: None }
+    DrawnCrest {
+        name,
+        course,
+        closed,
+        sharp: true,
+        half_width_mm: None,
+        ends: [CrestEnds::Natural; 2],
+    }
 }
 
 /// Heights over an ellipse, on nodes 0.5 mm apart; NaN outside.
