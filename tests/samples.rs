@@ -117,6 +117,11 @@ fn scroll_carves() {
 }
 
 #[test]
+fn acanthus_carves() {
+    carve(&samples().into_iter().find(|s| name(s) == "acanthus").unwrap());
+}
+
+#[test]
 fn shell_carves() {
     carve(&samples().into_iter().find(|s| name(s) == "shell").unwrap());
 }

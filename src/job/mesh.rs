@@ -195,7 +195,7 @@ impl Draft {
         let width = (size.x * most.min_element() * 10.0).floor().max(1.0) / 10.0;
         let unit = width / size.x;
         let own = round(size.z * unit);
-        let height = own.min(defaults.depth_mm);
+        let height = own.min(defaults.depth_mm - rule::HEADROOM_MM);
         let text = format!(
             "[[layer]]\nmesh = {{ file = {}, width_mm = {} }}\nheight_mm = {}\n",
             quoted(file),
