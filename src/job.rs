@@ -18,6 +18,7 @@ mod crest;
 mod edit;
 mod mesh;
 mod layer;
+mod selector;
 mod group;
 mod operation;
 mod settle;

@@ -202,7 +202,7 @@ impl Model {
         let mut fine = fine.map_err(|why| ModelError::Mesh { file: self.file.clone(), why })?;
         if let Some(edits) = &layer.edits {
             let all: Vec<usize> = (0..edits.list.len()).collect();
-            let from = Refined { control: control.mesh(), levels };
+            let from = Refined { control: control.mesh(), levels, halved: 1 };
             draw_to(edits, &all, &from, &mut fine, remarks)
                 .map_err(|fault| ModelError::Edit { layer: layer.name.clone(), fault })?;
         }

@@ -6,8 +6,8 @@ use toml::de::DeValue;
 use super::draft::text_or_form;
 use super::error::JobError;
 use super::keys::{CREST, CREST_ENDS};
-use super::layer::read_selector;
 use super::reader::{Table, as_number};
+use super::selector::read_selector;
 use super::surface::{CourseSpec, CrestEnds, DrawnCrestSpec};
 
 /// Keys that only a crest by points, or only one along paths, makes use of.

@@ -10,10 +10,11 @@ use super::keys::{
     ARTWORK, AT, BACKGROUND, GROUP, KEEP_OUT, LAYER, MACHINE, OPERATION, ORIGINS, RELIEF, SAFETY,
     STOCK, TOLERANCE, TOP, TRACE, TRACE_METHODS, WOOD, rule,
 };
-use super::layer::{LayerDraft, read_color, read_layer};
+use super::layer::{LayerDraft, read_layer};
 use super::library::{Library, read_machine, read_machine_file, read_wood};
 use super::operation::{OperationDraft, default_operations, read_operation};
 use super::reader::{Table, as_number};
+use super::selector::read_color;
 use super::types::{
     ArtworkSpec, Backdrop, Connectivity, Fit, KeepOut, Machine, Origin, Place, TraceMethod,
     TraceSpec, Wood,

@@ -853,7 +853,7 @@ pub(super) static EDIT_RULES: Section = Section {
             "rings",
             Kind::Forms("a whole number from 1 to 1000 or \"all\""),
             Number(4.0),
-            "how many rings of the control mesh round each edit may move; \"all\": everything",
+            "how many rings of the mesh round each edit may move; \"all\": everything",
         ),
         key(
             "move",

@@ -40,6 +40,8 @@ const MOST_COONS_FACES: usize = 1 << 20;
 const COONS_EDGE_CELLS: f64 = 1.0;
 /// Levels of a scheme that cuts triangles in four which two steps of Kobbelt's (in nine) stand for.
 const SQRT3_LEVELS: f64 = 1.584_962_500_721_156;
+/// Steps of refinement before vertices of an edited mesh move: three rows of them between outline and crest.
+const HALVED: u32 = 2;
 /// Rounds of smoothing for a spine that no rungs carry.
 const SMOOTH_ROUNDS: usize = 2;
 
@@ -411,7 +413,8 @@ impl Subdivided {
         let Self { mut mesh, control, levels, mut fine, .. } = self;
         mesh.vertices.truncate(fine.vertices.len());
         fine.vertices = mesh.vertices;
-        draw_to(edits, own, &Refined { control: &control, levels }, &mut fine, remarks)?;
+        let from = Refined { control: &control, levels, halved: HALVED };
+        draw_to(edits, own, &from, &mut fine, remarks)?;
         Ok(fine.to_triangles())
     }
 }

@@ -163,6 +163,9 @@ pub struct Refined<'a> {
     pub control: &'a PolyMesh,
     /// How many times it was refined, at least once: faces in the order of [`SpacedMesh::refined`].
     pub levels: u32,
+    /// How often it is refined before its vertices move: where all of its vertices lie on outline and crest, none between
+    /// them could.
+    pub halved: u32,
 }
 
 /// Moves the vertices of the refined mesh so that it meets the layer's edits with these indices as well as they allow.
@@ -184,8 +187,10 @@ pub fn draw_to(
     if refined.levels == 0 {
         return Err(EditFault::NoLevels { written: first() });
     }
-    let surface = LimitSurface::of(control, |_, _| false).map_err(solve)?;
-    let grown = Grown::new(&surface, fine, refined.levels);
+    let halved = refined.halved.min(refined.levels);
+    let moving = SpacedMesh::new(control.clone()).refined(halved).map_err(solve)?;
+    let surface = LimitSurface::of(moving.mesh(), |_, _| false).map_err(solve)?;
+    let grown = Grown::new(control, fine, refined.levels, &surface, halved);
     let (mut wishes, mut edits) = (Vec::new(), Vec::new());
     for &index in own {
         for (place, wish) in wishes_of(&spec.list[index], &grown)? {
@@ -208,9 +213,10 @@ pub fn draw_to(
         }
         why => EditFault::Solve { written: first(), why },
     })?;
-    let mut change = control.clone();
+    let mut change = moving.mesh().clone();
     change.vertices.clone_from(&found.moved);
-    let change = SpacedMesh::new(change).refined(refined.levels).and_then(|fine| fine.settled());
+    let left = refined.levels - halved;
+    let change = SpacedMesh::new(change).refined(left).and_then(|fine| fine.settled());
     let change = change.map_err(solve)?;
     let before = spec.in_space.then(|| fine.to_triangles());
     fine.vertices.iter_mut().zip(&change.vertices).for_each(|(at, by)| *at += *by);
@@ -272,7 +278,7 @@ fn wishes_of(spec: &EditSpec, grown: &Grown<'_>) -> Result<Vec<(Place, Wish)>, E
             grown.over_plan(at).ok_or(EditFault::Outside { written: written(), at })?
         }
         EditPlace::Mesh { face, corner, u, v } => {
-            let count = grown.surface.mesh().len();
+            let count = grown.control.len();
             if face > count {
                 return Err(EditFault::NoFace { written: written(), face, count });
             }

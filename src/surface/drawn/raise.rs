@@ -53,7 +53,7 @@ pub(in crate::surface) fn raise(
         let (mut fine, levels) = refined(&control, region, &settings).map_err(crest)?;
         if let Some(spec) = &layer.edits {
             let mesh = control.mesh.projected();
-            let from = Refined { control: &mesh, levels };
+            let from = Refined { control: &mesh, levels, halved: 0 };
             draw_to(spec, &edits::within(layer, region), &from, &mut fine, remarks)
                 .map_err(|fault| SurfaceError::Edit { layer: layer.name.clone(), fault })?;
         }

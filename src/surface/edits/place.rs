@@ -7,12 +7,15 @@ use crate::surface::weld::cut_quad;
 /// Corners of a quadrilateral by its u and v.
 const CORNERS: [DVec2; 4] = [DVec2::ZERO, DVec2::X, DVec2::ONE, DVec2::Y];
 
-/// A control mesh and what it was refined to.
+/// A control mesh, what it was refined to, and the mesh between both whose vertices move.
 pub(super) struct Grown<'a> {
-    pub(super) surface: &'a LimitSurface,
+    pub(super) control: &'a PolyMesh,
     /// Quadrilaterals all over.
     pub(super) fine: &'a PolyMesh,
     levels: u32,
+    /// The limit over the mesh that moves: the control mesh refined `halved` times.
+    surface: &'a LimitSurface,
+    halved: u32,
     /// Sides of all faces of the control mesh before each of them.
     start: Vec<usize>,
 }
@@ -52,16 +55,22 @@ impl Place {
 }
 
 impl<'a> Grown<'a> {
-    /// `fine` is the control mesh refined so many times, once at least.
-    pub(super) fn new(surface: &'a LimitSurface, fine: &'a PolyMesh, levels: u32) -> Self {
-        let sides = surface.mesh().faces().map(<[u32]>::len);
+    /// `fine` is the control mesh refined `levels` times, once at least and no less often than `surface`'s.
+    pub(super) fn new(
+        control: &'a PolyMesh,
+        fine: &'a PolyMesh,
+        levels: u32,
+        surface: &'a LimitSurface,
+        halved: u32,
+    ) -> Self {
+        let sides = control.faces().map(<[u32]>::len);
         let start = sides.scan(0, |sum, sides| Some(std::mem::replace(sum, *sum + sides)));
-        Self { surface, fine, levels, start: start.collect() }
+        Self { control, fine, levels, surface, halved, start: start.collect() }
     }
 
     /// Number of sides of a face of the control mesh.
     pub(super) fn sides(&self, face: usize) -> usize {
-        self.surface.mesh().face(face).len()
+        self.control.face(face).len()
     }
 
     fn quad(&self, quad: usize) -> [u32; 4] {
@@ -125,7 +134,7 @@ impl<'a> Grown<'a> {
 
     /// What an edit at a place asks of the control mesh.
     pub(super) fn over(&self, place: &Place, by: Option<DVec3>, normal: Option<DVec3>) -> Edit {
-        let spots = place.corners.map(|corner| self.spot(place.quad, CORNERS[corner]));
+        let spots = place.corners.map(|corner| self.spot_that_moves(place.quad, CORNERS[corner]));
         let rows = spots.map(|spot| self.row(&spot));
         let mix = |parts: [f64; 3]| {
             let mut row = SparseRow::new();
@@ -159,6 +168,18 @@ impl<'a> Grown<'a> {
         sample.vertices.into_iter().zip(sample.point).collect()
     }
 
+    /// Where a place of a quadrilateral of the refined mesh lies on the mesh that moves.
+    fn spot_that_moves(&self, mut quad: usize, mut at: DVec2) -> Spot {
+        if self.halved == 0 {
+            return self.spot(quad, at);
+        }
+        for _ in self.halved..self.levels {
+            at = outer(quad % 4, at);
+            quad /= 4;
+        }
+        Spot { face: quad, part: None, u: at.x, v: at.y }
+    }
+
     /// Where a place of a quadrilateral of the refined mesh lies on the control mesh.
     fn spot(&self, mut quad: usize, mut at: DVec2) -> Spot {
         for _ in 1..self.levels {
@@ -182,7 +203,7 @@ impl<'a> Grown<'a> {
             middle += CORNERS[*corner] * part;
         }
         let spot = self.spot(place.quad, middle);
-        let mesh = self.surface.mesh();
+        let mesh = self.control;
         let sides_of = |face: usize| self.sides(face) == 4;
         if !sides_of(spot.face) {
             return Err((0, NO_QUAD));

@@ -69,14 +69,14 @@ fn drawn(
     let mut fine = if levels > 0 { refined(control, levels) } else { control.clone() };
     let all: Vec<usize> = (0..spec.list.len()).collect();
     let mut remarks = Vec::new();
-    draw_to(spec, &all, &Refined { control, levels }, &mut fine, &mut remarks)?;
+    draw_to(spec, &all, &Refined { control, levels, halved: 0 }, &mut fine, &mut remarks)?;
     Ok((fine, remarks))
 }
 
 /// The highest place of a refined mesh over a point: its height and normal.
 fn over(control: &PolyMesh, levels: u32, fine: &PolyMesh, at: DVec2) -> (f64, DVec3) {
     let surface = LimitSurface::of(control, |_, _| false).unwrap();
-    let place = Grown::new(&surface, fine, levels).over_plan(at).unwrap();
+    let place = Grown::new(control, fine, levels, &surface, 0).over_plan(at).unwrap();
     (place.at(fine).z, place.normal(fine))
 }
 
@@ -102,6 +102,34 @@ fn heights_and_normals_are_met_by_every_method_and_the_rest_of_the_outline_stays
             for (a, b) in before.vertices.iter().zip(&fine.vertices) {
                 assert!(!on_rim(a) || a.distance(*b) < 1e-12, "{a} {b}");
                 assert!(in_space || a.truncate() == b.truncate());
+            }
+        }
+    }
+}
+
+/// A strip of faces from rim to rim has no vertex that could move before it is refined.
+#[test]
+fn meshes_without_inner_vertices_are_edited_on_a_finer_one() {
+    let points = [[0.0, 0.0], [4.0, 0.0], [8.0, 0.0], [8.0, 4.0], [4.0, 4.0], [0.0, 4.0]];
+    let mut control = PolyMesh::with_vertices(points.map(|[x, y]| DVec3::new(x, y, 0.0)).to_vec());
+    control.add_face(&[0, 1, 4, 5]);
+    control.add_face(&[1, 2, 3, 4]);
+    let normal = DVec3::new(0.1, -0.2, 1.0);
+    let place = EditPlace::Plan(DVec2::new(3.1, 2.3));
+    let by_plan = spec(vec![edit_at(place, EditTarget::Height(0.7), Some(normal))]);
+    let place = EditPlace::Mesh { face: 2, corner: None, u: 0.4, v: 0.6 };
+    let by_face = spec(vec![edit_at(place, EditTarget::Height(0.7), None)]);
+    for (halved, missed) in [(0, true), (1, true), (2, false), (3, false)] {
+        for spec in [&by_plan, &by_face] {
+            let mut fine = refined(&control, 5);
+            let mut remarks = Vec::new();
+            let from = Refined { control: &control, levels: 5, halved };
+            draw_to(spec, &[0], &from, &mut fine, &mut remarks).unwrap();
+            let misses = missed && (halved == 0 || spec == &by_plan);
+            assert_eq!(remarks.is_empty(), !misses, "{halved}: {remarks:?}");
+            if spec == &by_plan && !missed {
+                let (height, got) = over(&control, 5, &fine, DVec2::new(3.1, 2.3));
+                assert!((height - 0.7).abs() < 1e-3 && got.angle_between(normal) < 0.02);
             }
         }
     }
@@ -144,7 +172,7 @@ proptest! {
         let (control, levels) = (irregular(), 5);
         let surface = LimitSurface::of(&control, |_, _| false).unwrap();
         let fine = refined(&control, levels);
-        let grown = Grown::new(&surface, &fine, levels);
+        let grown = Grown::new(&control, &fine, levels, &surface, 0);
         let part = (grown.sides(face) != 4 || corner > 0).then_some(corner.min(grown.sides(face) - 1));
         let found = grown.on_mesh(face, part, u, v).at(&fine);
         let want = surface.at_part(face, part, u, v).unwrap().place(&control.vertices);

@@ -380,3 +380,51 @@ fn edits_cost_what_is_tabled_and_nothing_costs_less() {
         near(got, want);
     }
 }
+
+#[test]
+fn the_energy_has_the_rank_the_null_space_and_the_least_eigenvalue_that_are_tabled() {
+    // A regular face by the general way is the matrix itself: valence 4.
+    let (grid, q) = (grid(), regular());
+    let (ids, general) = of_face(&grid, 6 * 2 + 2, true).unwrap();
+    let place = |v: u32| (4 * (v % 7 - 1) + v / 7 - 1) as usize;
+    assert_eq!(ids.len(), 16);
+    for (a, row) in ids.iter().zip(&general) {
+        for (b, value) in ids.iter().zip(row) {
+            assert!((value - q[place(*a)][place(*b)]).abs() < 1e-14);
+        }
+    }
+    // Rank by elimination with the largest pivot.
+    let mut rows: Vec<Vec<f64>> = q.iter().map(|row| row.to_vec()).collect();
+    let mut rank = 0;
+    loop {
+        let left = (rank..16).flat_map(|i| (rank..16).map(move |j| (i, j)));
+        let largest = left.max_by(|a, b| rows[a.0][a.1].abs().total_cmp(&rows[b.0][b.1].abs()));
+        let Some((i, j)) = largest.filter(|&(i, j)| rows[i][j].abs() > 1e-12) else { break };
+        rows.swap(rank, i);
+        rows.iter_mut().for_each(|row| row.swap(rank, j));
+        let pivot = rows[rank].clone();
+        for row in &mut rows[rank + 1..] {
+            let part = row[rank] / pivot[rank];
+            row.iter_mut().zip(&pivot).for_each(|(value, pivot)| *value -= part * pivot);
+        }
+        rank += 1;
+    }
+    assert_eq!(rank, 13);
+    // The boundary held: the least eigenvalue, by inverse iteration.
+    let topology = Topology::of(grid.mesh()).unwrap();
+    let inner: Vec<u32> = (0..49).filter(|&v| !topology.is_boundary(v)).collect();
+    let mut index = vec![None; 49];
+    (0..).zip(&inner).for_each(|(k, &v)| index[v as usize] = Some(k));
+    let matrix = energy::assemble(&grid, &topology, &index, inner.len()).unwrap();
+    let places: Vec<DVec3> = inner.iter().map(|&v| grid.mesh().vertices[v as usize]).collect();
+    let factor = Factor::of(&matrix, &places).unwrap();
+    let mut x: Vec<f64> = (0..25).map(|k| 1.0 + 0.01 * f64::from(k)).collect();
+    let mut value = 0.0;
+    for _ in 0..100 {
+        let y = factor.solve(&x);
+        let size = y.iter().map(|y| y * y).sum::<f64>().sqrt();
+        value = x.iter().map(|x| x * x).sum::<f64>().sqrt() / size;
+        x = y.into_iter().map(|y| y / size).collect();
+    }
+    near(value, 0.250334478);
+}
