@@ -401,7 +401,9 @@ fn the_energy_has_the_rank_the_null_space_and_the_least_eigenvalue_that_are_tabl
         let largest = left.max_by(|a, b| rows[a.0][a.1].abs().total_cmp(&rows[b.0][b.1].abs()));
         let Some((i, j)) = largest.filter(|&(i, j)| rows[i][j].abs() > 1e-12) else { break };
         rows.swap(rank, i);
-        rows.iter_mut().for_each(|row| row.swap(rank, j));
+        for row in &mut rows {
+            row.swap(rank, j);
+        }
         let pivot = rows[rank].clone();
         for row in &mut rows[rank + 1..] {
             let part = row[rank] / pivot[rank];
