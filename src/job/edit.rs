@@ -39,7 +39,7 @@ pub enum EditMethod {
     LeastChange,
     /// Its thin-plate energy; edits are met exactly, or with this penalty.
     Energy {
-        /// Weight of the squared errors, in mean diagonal entries of the energy; `None`: exact.
+        /// Weight of the squared errors against the energy; `None`: exact.
         penalty: Option<f64>,
     },
 }

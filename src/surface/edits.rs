@@ -221,12 +221,8 @@ pub fn draw_to(
     let before = spec.in_space.then(|| fine.to_triangles());
     fine.vertices.iter_mut().zip(&change.vertices).for_each(|(at, by)| *at += *by);
     let edit_of = |k: usize| &spec.list[wishes[k].0];
-    // What the library calls flipped goes by the solution; what counts is the surface that there is now.
-    for (k, (_, place, wish)) in wishes.iter().enumerate() {
-        let turned = wish.normal.is_some_and(|normal| place.normal(fine).dot(normal) <= 0.0);
-        if turned || (wish.normal.is_some() && found.flipped.contains(&k)) {
-            return Err(EditFault::Flipped { written: edit_of(k).written.0.clone() });
-        }
+    if let Some(&k) = found.flipped.first() {
+        return Err(EditFault::Flipped { written: edit_of(k).written.0.clone() });
     }
     for k in found.conflicts() {
         let (index, place, wish) = &wishes[k];

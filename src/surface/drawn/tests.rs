@@ -177,25 +177,34 @@ fn the_heightfield_holds_crests_up_to_a_cell() {
     }
 }
 
+/// Numbers between two others, by a seed.
+fn dice(mut seed: u64) -> impl FnMut(f64, f64) -> f64 {
+    move |low, high| {
+        seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        low + (high - low) * ((seed >> 11) as f64 / (1_u64 << 53) as f64)
+    }
+}
+
+/// An ellipse with three and five waves.
+fn wavy(dice: &mut impl FnMut(f64, f64) -> f64) -> Region {
+    let waves = [dice(0.0, 0.12), dice(0.0, 0.1), dice(0.0, TAU), dice(0.0, TAU)];
+    let at = |k: usize| {
+        let a = TAU * k as f64 / 180.0;
+        let r = 1.0
+            + waves[0] * libm::sin(3.0 * a + waves[2])
+            + waves[1] * libm::sin(5.0 * a + waves[3]);
+        DVec2::new(30.0 * r * libm::cos(a), 22.0 * r * libm::sin(a))
+    };
+    Region { outer: (0..180).map(at).collect(), holes: Vec::new() }
+}
+
 /// Random outlines and crests: faces that stand upright, or a refusal that names a place and a cure.
 #[test]
 fn random_crests_fold_nowhere_or_are_refused() {
-    let mut seed = 1_u64;
-    let mut dice = |low: f64, high: f64| {
-        seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-        low + (high - low) * ((seed >> 11) as f64 / (1_u64 << 53) as f64)
-    };
+    let mut dice = dice(1);
     let (mut raised, mut refused) = (0, 0);
     for run in 0..50 {
-        let waves = [dice(0.0, 0.12), dice(0.0, 0.1), dice(0.0, TAU), dice(0.0, TAU)];
-        let at = |k: usize| {
-            let a = TAU * k as f64 / 180.0;
-            let r = 1.0
-                + waves[0] * libm::sin(3.0 * a + waves[2])
-                + waves[1] * libm::sin(5.0 * a + waves[3]);
-            DVec2::new(30.0 * r * libm::cos(a), 22.0 * r * libm::sin(a))
-        };
-        let region = Region { outer: (0..180).map(at).collect(), holes: Vec::new() };
+        let region = wavy(&mut dice);
         let mut crests = Vec::new();
         for _ in 0..=(run % 3) {
             let n = 2 + (dice(0.0, if run % 2 == 0 { 2.0 } else { 4.0 }) as usize);
