@@ -63,7 +63,7 @@ use motion::RELIABLE_LINES_PER_S;
 use outline::{OutlineError, Outlines};
 use proof::{ProgramText, ProofError, Verdict};
 use relief::{Grounds, Relief, ReliefError};
-use surface::SurfaceError;
+use surface::{EditedPlace, SurfaceError};
 use toolpath::{PlanEvent, Toolpath, ToolpathError};
 
 /// What is to be carved: the job, its outlines and the target.
@@ -75,6 +75,8 @@ pub struct Design {
     pub outlines: Outlines,
     /// The target.
     pub relief: Relief,
+    /// The places of the shape edits.
+    pub edited: Vec<EditedPlace>,
     /// What the user should know.
     pub notes: Vec<String>,
 }
@@ -208,7 +210,7 @@ pub fn design_of(
         .flatten()
         .cloned()
         .collect();
-    Ok(Design { job, outlines, relief, notes })
+    Ok(Design { job, outlines, relief, edited: raised.edited, notes })
 }
 
 /// What a job needs to know of its artwork and its meshes before it can be settled.

@@ -14,8 +14,8 @@ use crate::geom::{DVec3, Ring, orient};
 use crate::job::{Job, LayerSpec, MeshSpec, SurfaceSpec};
 use crate::outline::{Figure, Outlines, RegionFault, silhouette};
 use crate::surface::{
-    CreasedMesh, EditFault, Mesh, Raised, Refined, Remark, SubdivideError, Surface, draw_to,
-    levels, tell,
+    CreasedMesh, EditFault, EditedPlace, Mesh, Raised, Refined, Remark, SubdivideError, Surface,
+    draw_to, levels, tell,
 };
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -292,6 +292,7 @@ pub fn raise(
         let Made { figure, surface, hidden, remarks } = made?;
         let told: Vec<(&str, Remark)> =
             remarks.into_iter().map(|r| (model.file.as_str(), r)).collect();
+        raised.edited.extend(EditedPlace::among(k, told.iter().map(|t| &t.1)));
         tell(layer, &told, pitch_mm, &mut raised.notes);
         outlines.layers[k].figures = vec![figure];
         raised.surfaces[k] = vec![surface];

@@ -193,6 +193,15 @@ pub enum Remark {
         /// The first of them, mm.
         at: crate::geom::DVec2,
     },
+    /// A place of a shape edit: no news, for those who show what edits did.
+    EditPlaced {
+        /// Its number in the layer, from 0.
+        edit: usize,
+        /// Where it lies on the edited surface, mm.
+        at: crate::geom::DVec2,
+        /// The height that is asked for there, mm; none where only a normal is.
+        height_mm: Option<f64>,
+    },
     /// A shape edit is not met: it contradicts others or what is held, or its penalty lets it.
     EditMissed {
         /// Its number in the layer, from 0.
@@ -227,11 +236,39 @@ pub struct RaisedFigure {
     pub remarks: Vec<Remark>,
 }
 
+/// A place of a shape edit.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct EditedPlace {
+    /// The layer, from 0.
+    pub layer: usize,
+    /// The edit in its layer, from 0.
+    pub edit: usize,
+    /// Where it lies on the edited surface, mm.
+    pub at: crate::geom::DVec2,
+    /// The height of the layer that is asked for there, mm; none where only a normal is.
+    pub height_mm: Option<f64>,
+}
+
+impl EditedPlace {
+    /// Those among the remarks on a layer.
+    pub fn among<'a>(
+        layer: usize,
+        remarks: impl IntoIterator<Item = &'a Remark>,
+    ) -> impl Iterator<Item = Self> {
+        remarks.into_iter().filter_map(move |remark| match *remark {
+            Remark::EditPlaced { edit, at, height_mm } => Some(Self { layer, edit, at, height_mm }),
+            _ => None,
+        })
+    }
+}
+
 /// The surfaces of all figures and what the user should know.
 #[derive(Debug, Clone)]
 pub struct Raised {
     /// One for each figure of each layer, in the order of the outlines.
     pub surfaces: Vec<Vec<Surface>>,
+    /// The places of shape edits.
+    pub edited: Vec<EditedPlace>,
     /// What the user should know, by layer.
     pub notes: Vec<String>,
 }
@@ -311,11 +348,12 @@ pub fn raise_all(
         surfaces[l].push(raised.surface);
         remarks[l].extend(raised.remarks.into_iter().map(|r| (figure.source.as_str(), r)));
     }
-    let mut notes = Vec::new();
-    for (layer, remarks) in layers.iter().zip(&remarks) {
+    let (mut edited, mut notes) = (Vec::new(), Vec::new());
+    for (l, (layer, remarks)) in layers.iter().zip(&remarks).enumerate() {
+        edited.extend(EditedPlace::among(l, remarks.iter().map(|r| &r.1)));
         notes::tell(layer, remarks, grid.pitch_mm, &mut notes);
     }
-    Ok(Raised { surfaces, notes })
+    Ok(Raised { surfaces, edited, notes })
 }
 
 /// Refuses numbers that no surface can be made of.

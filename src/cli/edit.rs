@@ -4,8 +4,9 @@ use super::files::{EarlierPrograms, Outputs};
 use super::observe::{self, Stages};
 use super::{Stop, inputs, outcome};
 use crate::geom::{DVec2, Heightfield};
-use crate::job::{EditPlace, EditTarget, Job};
+use crate::job::{Job, LayerSpec};
 use crate::report::{Look, change_png, shaded_png};
+use crate::surface::EditedPlace;
 use crate::{Design, design_of};
 use std::path::{Path, PathBuf};
 
@@ -38,15 +39,15 @@ pub(super) struct Args {
     quiet: bool,
 }
 
-/// What became of one edit, in the relief.
+/// What became of one place of an edit, in the relief.
 #[derive(Debug, serde::Serialize)]
 struct Done {
     /// Its number among all edits of the job, from 1: as on the change map.
     number: usize,
     layer: String,
     written: String,
-    /// x and y in work coordinates, mm; none for a place by its face.
-    at: Option<DVec2>,
+    /// x and y in work coordinates, mm.
+    at: DVec2,
     /// Height above the background that was asked for, mm.
     wanted_mm: Option<f64>,
     /// Height of the relief there above the background, mm.
@@ -82,7 +83,7 @@ pub(super) fn run(args: &Args) -> Result<(), Stop> {
     stages.enter("pictures");
     let (old, new) = (&before.relief.target, &after.relief.target);
     let done = done(&after, old);
-    let marks: Vec<(usize, DVec2)> = done.iter().filter_map(|d| Some((d.number, d.at?))).collect();
+    let marks: Vec<(usize, DVec2)> = done.iter().map(|d| (d.number, d.at)).collect();
     let (job, title) = (&after.job, &after.job.title);
     let wood = Look::of_wood(&job.stock.wood.name, job.stock.grain_rad);
     outputs.add("before.png", &shaded_png(old, wood, Some(&format!("{title}: before")))?)?;
@@ -109,45 +110,38 @@ pub(super) fn run(args: &Args) -> Result<(), Stop> {
     Ok(())
 }
 
-/// All edits, and what the relief is like at their places.
+/// All places of all edits, and what the relief is like there.
 fn done(after: &Design, before: &Heightfield) -> Vec<Done> {
-    let job = &after.job;
-    let above = |field: &Heightfield, at| field.height_at(at).map(|z| z + job.relief.depth_mm);
-    let all = job.layers.iter().flat_map(|layer| {
-        layer.edits.iter().flat_map(|edits| &edits.list).map(move |edit| (layer, edit))
-    });
-    let mut done: Vec<Done> = Vec::new();
-    for (layer, edit) in all {
-        let (at, wanted_mm) = match (edit.at, &edit.target) {
-            (_, EditTarget::Point(to)) => (Some(to.truncate()), Some(to.z)),
-            (EditPlace::Plan(at), EditTarget::Height(height)) => (Some(at), Some(*height)),
-            (EditPlace::Plan(at), _) => (Some(at), None),
-            (EditPlace::Mesh { .. }, EditTarget::Height(height)) => (None, Some(*height)),
-            (EditPlace::Mesh { .. }, _) => (None, None),
-        };
-        done.push(Done {
-            number: done.len() + 1,
+    let layers = &after.job.layers;
+    let above =
+        |field: &Heightfield, at| field.height_at(at).map(|z| z + after.job.relief.depth_mm);
+    let edits_of = |layer: &LayerSpec| layer.edits.as_ref().map_or(0, |edits| edits.list.len());
+    let place = |place: &EditedPlace| {
+        let layer = &layers[place.layer];
+        let written = layer.edits.as_ref().map(|edits| edits.list[place.edit].written.0.clone());
+        Done {
+            number: layers[..place.layer].iter().map(edits_of).sum::<usize>() + place.edit + 1,
             layer: layer.name.clone(),
-            written: edit.written.0.clone(),
-            at,
-            wanted_mm: wanted_mm.map(|height| height + layer.offset_mm),
-            before_mm: at.and_then(|at| above(before, at)),
-            after_mm: at.and_then(|at| above(&after.relief.target, at)),
-        });
-    }
+            written: written.unwrap_or_default(),
+            at: place.at,
+            wanted_mm: place.height_mm.map(|height| height + layer.offset_mm),
+            before_mm: above(before, place.at),
+            after_mm: above(&after.relief.target, place.at),
+        }
+    };
+    let mut done: Vec<Done> = after.edited.iter().map(place).collect();
+    done.sort_by_key(|d| d.number);
     done
 }
 
-/// The edits, a line each.
+/// The places of the edits, a line each.
 fn table(done: &[Done]) -> String {
     let mm = |v: Option<f64>| v.map_or("-".to_owned(), |v| format!("{v:.3}"));
     let mut text = String::from(
         "edit   at x      at y    wanted    before     after  (mm above the background)",
     );
     for d in done {
-        let [x, y] = d.at.map_or(["-".to_owned(), "-".to_owned()], |at| {
-            at.to_array().map(|v| format!("{v:.2}"))
-        });
+        let [x, y] = d.at.to_array().map(|v| format!("{v:.2}"));
         text += &format!(
             "\n{:>4} {x:>8} {y:>9} {:>9} {:>9} {:>9}  layer '{}', {}",
             d.number,

@@ -199,8 +199,11 @@ fn meshes_at(
     models: &[Model],
     outlines: &mut Outlines,
 ) -> Result<Vec<Vec<Surface>>, CarveError> {
-    let mut raised =
-        surface::Raised { surfaces: vec![Vec::new(); job.layers.len()], notes: Vec::new() };
+    let mut raised = surface::Raised {
+        surfaces: vec![Vec::new(); job.layers.len()],
+        edited: Vec::new(),
+        notes: Vec::new(),
+    };
     model::raise(models, job, pitch_mm, outlines, &mut raised)?;
     outlines.notes.extend(raised.notes);
     Ok(raised.surfaces)

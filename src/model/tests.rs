@@ -207,6 +207,43 @@ fn the_target_is_the_limit_surface_at_the_nodes() {
     assert!((outlines.layers[0].figures.len(), region.holes.len()) == (1, 0));
 }
 
+/// Edits of a mesh by the plan and by a face hold in the heightfield, as far as it bends within a cell; the design tells
+/// where each lies. Faces are 10 mm wide and their u and v run along x and y.
+#[test]
+fn edits_of_a_mesh_hold_in_the_heightfield() {
+    let job = "[relief]\npitch_mm = 0.25\n\
+               [[layer]]\nmesh = { file = \"m.obj\", width_mm = 30 }\nbase_mm = 1\nheight_mm = 6\n\
+               [[layer.edit]]\nat = [24.3, 27.1]\nheight_mm = 4.5\nnormal = [0.1, -0.2, 1]\n\
+               [[layer.edit]]\nface = 6\nu = 0.3\nv = 0.55\nheight_mm = 3\n";
+    let design = design(job, &waves(), None).unwrap();
+    assert!(design.notes.iter().all(|note| !note.contains("edit ")), "{:?}", design.notes);
+    let corner = design.job.layers[0].mesh().unwrap().lower_left_mm;
+    let by_face = corner + DVec2::new(20.0 + 3.0, 10.0 + 5.5);
+    let wanted = [(DVec2::new(24.3, 27.1), 4.5), (by_face, 3.0)];
+    assert_eq!(design.edited.len(), 2);
+    for (edited, (place, height)) in design.edited.iter().zip(wanted) {
+        assert!(edited.at.distance(place) < 1e-9, "{} {place}", edited.at);
+        assert_eq!(edited.height_mm, Some(height));
+        let above = |x: f64, y: f64| at(&design.relief.target, place.x + x, place.y + y) + 8.0;
+        let mut bend = 0.0_f64;
+        for k in 0..25 {
+            let (x, y) = (0.25 * f64::from(k % 5 - 2), 0.25 * f64::from(k / 5 - 2));
+            for (a, b) in [(0.25, 0.0), (0.0, 0.25)] {
+                bend =
+                    bend.max((above(x - a, y - b) - 2.0 * above(x, y) + above(x + a, y + b)).abs());
+            }
+        }
+        let got = above(0.0, 0.0);
+        assert!(bend < 0.05 && (got - height).abs() < 2.0 * bend + 1e-4, "{got} {height} {bend}");
+        if height == 4.5 {
+            let slope = |x: f64, y: f64| (above(x, y) - above(-x, -y)) / 0.5;
+            let normal = DVec3::new(-slope(0.25, 0.0), -slope(0.0, 0.25), 1.0);
+            let off = normal.angle_between(DVec3::new(0.1, -0.2, 1.0));
+            assert!(off < 0.02 + bend / 0.25, "{normal} {off}");
+        }
+    }
+}
+
 /// A closed mesh gives its upper side, whichever way its faces look; its outline is the shadow.
 #[test]
 fn a_closed_mesh_is_seen_from_above() {

@@ -220,6 +220,10 @@ pub fn draw_to(
     let change = change.map_err(solve)?;
     let before = spec.in_space.then(|| fine.to_triangles());
     fine.vertices.iter_mut().zip(&change.vertices).for_each(|(at, by)| *at += *by);
+    for (index, place, wish) in &wishes {
+        let height_mm = wish.point.map(|_| wish.to.z);
+        remarks.push(Remark::EditPlaced { edit: *index, at: place.at(fine).truncate(), height_mm });
+    }
     let edit_of = |k: usize| &spec.list[wishes[k].0];
     if let Some(&k) = found.flipped.first() {
         return Err(EditFault::Flipped { written: edit_of(k).written.0.clone() });

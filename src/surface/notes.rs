@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 pub fn tell(layer: &LayerSpec, remarks: &[(&str, Remark)], pitch_mm: f64, notes: &mut Vec<String>) {
     let mut kinds: BTreeMap<usize, Worst> = BTreeMap::new();
     for &(source, remark) in remarks {
-        let (kind, rank) = rank(&remark);
+        let Some((kind, rank)) = rank(&remark) else { continue };
         let worst = kinds.entry(kind).or_insert(Worst { count: 0, rank, source, remark });
         worst.count += 1;
         if rank < worst.rank {
@@ -23,9 +23,11 @@ pub fn tell(layer: &LayerSpec, remarks: &[(&str, Remark)], pitch_mm: f64, notes:
     );
 }
 
-/// The place of a kind of remark among the notes, and how bad one is: the lowest is the worst.
-fn rank(remark: &Remark) -> (usize, f64) {
-    match *remark {
+/// The place of a kind of remark among the notes, and how bad one is: the lowest is the worst. What is
+/// no news has none.
+fn rank(remark: &Remark) -> Option<(usize, f64)> {
+    Some(match *remark {
+        Remark::EditPlaced { .. } => return None,
         Remark::TooNarrow { width_mm, .. } => (0, width_mm),
         Remark::Narrow { width_mm, .. } => (1, width_mm),
         Remark::Capped { height_mm } => (2, height_mm),
@@ -42,7 +44,7 @@ fn rank(remark: &Remark) -> (usize, f64) {
         // Each edit is told by itself.
         Remark::EditMissed { edit, .. } => (13 + 2 * edit, 0.0),
         Remark::EditFolded { edit, .. } => (14 + 2 * edit, 0.0),
-    }
+    })
 }
 
 /// How many remarks of a kind there are, and the worst of them.
@@ -65,6 +67,7 @@ impl Worst<'_> {
             format!("edit {} ({written})", k + 1)
         };
         match self.remark {
+            Remark::EditPlaced { .. } => String::new(),
             Remark::EditMissed { edit: k, by_mm, by_rad } => {
                 let penalty = edits.is_some_and(|edits| {
                     matches!(edits.method, EditMethod::Energy { penalty: Some(_) })

@@ -17,6 +17,7 @@ use self::factor::Factor;
 use super::masks::SparseRow;
 use super::{EvaluateError, LimitSurface, Sample, SubdivideError, Topology};
 use crate::geom::{DVec2, DVec3};
+use rayon::prelude::*;
 
 /// Residuals above this mean that edits contradict each other.
 const CONFLICT: f64 = 1e-6;
@@ -176,6 +177,55 @@ struct Condition {
     value: f64,
 }
 
+impl Condition {
+    /// Its weights of the free unknowns, sorted: `index` of a vertex for x or for z alone, `n` more for each further axis.
+    fn row(&self, index: &[Option<u32>], n: usize, in_space: bool) -> SparseRow {
+        let mut row = SparseRow::new();
+        for &(v, weight) in &self.terms {
+            let Some(k) = index[v as usize] else { continue };
+            let parts = weight.to_array();
+            let parts = if in_space { &parts[..] } else { &parts[2..] };
+            let own = (0..).zip(parts).filter(|(_, part)| **part != 0.0);
+            row.extend(own.map(|(axis, &part)| (axis * n as u32 + k, part)));
+        }
+        row.sort_by_key(|r| r.0);
+        row.dedup_by(|next, kept| {
+            let same = next.0 == kept.0;
+            if same {
+                kept.1 += next.1;
+            }
+            same
+        });
+        row
+    }
+}
+
+/// A row whose axes are worked upon one by one.
+fn by_axis(row: &[(u32, f64)], n: usize, work: impl Fn(&[(u32, f64)]) -> SparseRow) -> SparseRow {
+    let axis = |r: &(u32, f64)| r.0 / n as u32;
+    let axes = row.chunk_by(|a, b| axis(a) == axis(b));
+    axes.flat_map(|part| {
+        let start = axis(&part[0]) * n as u32;
+        let own: SparseRow = part.iter().map(|&(k, value)| (k - start, value)).collect();
+        work(&own).into_iter().map(move |(k, value)| (start + k, value))
+    })
+    .collect()
+}
+
+/// The scalar product of two sorted rows.
+fn sparse_dot(a: &[(u32, f64)], mut b: &[(u32, f64)]) -> f64 {
+    let mut sum = 0.0;
+    for &(k, value) in a {
+        while b.first().is_some_and(|other| other.0 < k) {
+            b = &b[1..];
+        }
+        if let Some(other) = b.first().filter(|other| other.0 == k) {
+            sum += value * other.1;
+        }
+    }
+    sum
+}
+
 /// Solves a list of edits of a surface together.
 ///
 /// # Errors
@@ -197,37 +247,28 @@ pub fn edit(
     }
     let (index, free) = free(surface, &topology, edits, rules);
     let (n, axes) = (free.len(), if rules.in_space { 3 } else { 1 });
-    let rows: Vec<Vec<f64>> = (conditions.iter())
-        .map(|condition| {
-            let mut row = vec![0.0; n * axes];
-            for &(v, weight) in &condition.terms {
-                let Some(k) = index[v as usize] else { continue };
-                let parts = weight.to_array();
-                let parts = if rules.in_space { &parts[..] } else { &parts[2..] };
-                for (axis, part) in parts.iter().enumerate() {
-                    row[axis * n + k as usize] += part;
-                }
-            }
-            row
-        })
-        .collect();
+    // x, y and z of all that may move, one after the other.
+    let rows: Vec<SparseRow> =
+        conditions.iter().map(|condition| condition.row(&index, n, rules.in_space)).collect();
     let values: Vec<f64> = conditions.iter().map(|c| c.value).collect();
-    let images = match rules.method {
-        Method::LeastChange => rows.clone(),
+    let factor = match rules.method {
+        Method::LeastChange => None,
         Method::Energy { .. } => {
             let matrix = energy::assemble(surface, &topology, &index, n)?;
             let places: Vec<DVec3> = free.iter().map(|&v| points[v as usize]).collect();
-            let factor = Factor::of(&matrix, &places).ok_or(EditError::Loose)?;
-            // Energies of x, y and z are separate and the same.
-            let solve = |row: &Vec<f64>| -> Vec<f64> {
-                row.chunks(n.max(1)).flat_map(|part| factor.solve(part)).collect()
-            };
-            rows.iter().map(solve).collect()
+            Some(Factor::of(&matrix, &places).ok_or(EditError::Loose)?)
         }
     };
-    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-    let mut gram: Vec<Vec<f64>> =
-        rows.iter().map(|row| images.iter().map(|image| dot(row, image)).collect()).collect();
+    // A Q^-1 A^T = (L^-1 A^T)^T (L^-1 A^T): half of solving is enough, and only for what a condition reaches.
+    let images: Vec<SparseRow> = match &factor {
+        None => rows.clone(),
+        Some(factor) => {
+            rows.par_iter().map(|row| by_axis(row, n, |part| factor.half(part))).collect()
+        }
+    };
+    let mut gram: Vec<Vec<f64>> = (images.par_iter())
+        .map(|one| images.iter().map(|other| sparse_dot(one, other)).collect())
+        .collect();
     if let Method::Energy { penalty: Some(penalty) } = rules.method {
         // (Q + p A^T A)^-1 p A^T = Q^-1 A^T (1/p + A Q^-1 A^T)^-1.
         for (k, row) in gram.iter_mut().enumerate() {
@@ -236,12 +277,19 @@ pub fn edit(
     }
     let mut x = vec![0.0; n * axes];
     for (image, part) in images.iter().zip(Symmetric::of(gram).solve(&values)) {
-        x.iter_mut().zip(image).for_each(|(x, i)| *x += part * i);
+        for &(k, i) in image {
+            x[k as usize] += part * i;
+        }
+    }
+    if let Some(factor) = &factor {
+        // Energies of x, y and z are separate and the same.
+        x.chunks_mut(n.max(1)).for_each(|axis| factor.back(axis));
     }
     let mut residual = vec![0.0; edits.len()];
     for ((row, value), condition) in rows.iter().zip(&values).zip(&conditions) {
+        let now: f64 = row.iter().map(|&(k, part)| part * x[k as usize]).sum();
         let worst: &mut f64 = &mut residual[condition.edit];
-        *worst = worst.max((dot(row, &x) - value).abs());
+        *worst = worst.max((now - value).abs());
     }
     let mut moved = vec![DVec3::ZERO; points.len()];
     for (k, &v) in free.iter().enumerate() {

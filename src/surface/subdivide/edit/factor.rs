@@ -8,6 +8,7 @@
 //!   +------+-+------+   threads or one give the same bits.
 //! ```
 
+use super::super::masks::SparseRow;
 use crate::geom::DVec3;
 
 /// Parts of no more unknowns than this are not cut.
@@ -113,22 +114,33 @@ impl Factor {
         Some(Self { count, fronts })
     }
 
-    /// Solves for one right side.
-    pub(super) fn solve(&self, side: &[f64]) -> Vec<f64> {
-        debug_assert_eq!(side.len(), self.count, "one number for each unknown");
-        let mut x = side.to_vec();
+    /// Half of solving, from the front: a sparse right side divided by the factor, sorted, its zeros left out. The scalar
+    /// product of two halves is that of one side with the solution for the other.
+    pub(super) fn half(&self, side: &[(u32, f64)]) -> SparseRow {
+        let mut x = vec![0.0; self.count];
+        for &(v, value) in side {
+            x[v as usize] += value;
+        }
         for Front { own, later, lower } in &self.fronts {
             let height = own.len() + later.len();
             for (k, &v) in own.iter().enumerate() {
-                let column = &lower[k * height..(k + 1) * height];
-                let at = x[v as usize] / column[k];
-                x[v as usize] = at;
-                if at != 0.0 {
-                    let rows = own.iter().chain(later).zip(column).skip(k + 1);
-                    rows.for_each(|(&w, l)| x[w as usize] -= l * at);
+                let at = x[v as usize];
+                if at == 0.0 {
+                    continue;
                 }
+                let column = &lower[k * height..(k + 1) * height];
+                let at = at / column[k];
+                x[v as usize] = at;
+                let rows = own.iter().chain(later).zip(column).skip(k + 1);
+                rows.for_each(|(&w, l)| x[w as usize] -= l * at);
             }
         }
+        (0..).zip(x).filter(|(_, value)| *value != 0.0).collect()
+    }
+
+    /// The other half, from the back, in place.
+    pub(super) fn back(&self, x: &mut [f64]) {
+        debug_assert_eq!(x.len(), self.count, "one number for each unknown");
         for Front { own, later, lower } in self.fronts.iter().rev() {
             let height = own.len() + later.len();
             for (k, &v) in own.iter().enumerate().rev() {
@@ -138,7 +150,6 @@ impl Factor {
                 x[v as usize] = (x[v as usize] - known) / column[k];
             }
         }
-        x
     }
 }
 
