@@ -20,6 +20,7 @@ mod inward;
 mod lead;
 mod left;
 mod levels;
+mod needed;
 mod order;
 mod pencil;
 mod pocket;

@@ -174,8 +174,8 @@ pub(super) fn reached(inside: DVec2, outside: DVec2, free: impl Fn(DVec2) -> boo
     a
 }
 
-/// The stretches of a contour with points where `work` holds, with room at both ends; short gaps are kept.
-pub(super) fn runs_with(contour: &[DVec2], work: impl Fn(DVec2) -> bool) -> Vec<Vec<DVec2>> {
+/// The stretches of a contour with points (by their index) where `work` holds, with room at both ends; short gaps are kept.
+pub(super) fn runs_with(contour: &[DVec2], work: impl Fn(usize) -> bool) -> Vec<Vec<DVec2>> {
     let mut along = Vec::with_capacity(contour.len());
     let mut s = 0.0;
     for (k, p) in contour.iter().enumerate() {
@@ -183,7 +183,7 @@ pub(super) fn runs_with(contour: &[DVec2], work: impl Fn(DVec2) -> bool) -> Vec<
         along.push(s);
     }
     let mut stretches: Vec<(f64, f64)> = Vec::new();
-    for (&s, _) in along.iter().zip(contour).filter(|(_, p)| work(**p)) {
+    for &s in (0..contour.len()).filter(|&k| work(k)).map(|k| &along[k]) {
         match stretches.last_mut() {
             Some((_, to)) if s - *to <= GAP_MM => *to = s,
             _ => stretches.push((s, s)),
@@ -285,7 +285,8 @@ mod tests {
     #[test]
     fn only_stretches_with_work_are_cut() {
         let line: Vec<DVec2> = (0..=200).map(|k| DVec2::new(0.1 * f64::from(k), 0.0)).collect();
-        let work = |p: DVec2| (3.0..5.0).contains(&p.x) || (6.0..7.0).contains(&p.x) || p.x > 15.0;
+        let at = |k: usize| line[k].x;
+        let work = |k| (3.0..5.0).contains(&at(k)) || (6.0..7.0).contains(&at(k)) || at(k) > 15.0;
         let runs = runs_with(&line, work);
         assert_eq!(runs.len(), 2);
         let ends = |run: &[DVec2]| (run[0].x, run[run.len() - 1].x);

@@ -117,11 +117,25 @@ impl<'a> Emitter<'a> {
         profile: &Profile,
         block: &mut Block,
     ) {
+        self.passes_in_parts(chains, direction, profile, block, |chain, _| vec![chain]);
+    }
+
+    /// As [`Emitter::passes`]; `parts` says of each chain, on the wood as it is then, which parts of it are cut.
+    pub(super) fn passes_in_parts(
+        &mut self,
+        chains: Vec<Vec<DVec3>>,
+        direction: Direction,
+        profile: &Profile,
+        block: &mut Block,
+        parts: impl Fn(Vec<DVec3>, &Block) -> Vec<Vec<DVec3>>,
+    ) {
         for chain in in_order(chains, direction, self.at()) {
-            let first = self.moves.len();
-            let touch_mm = touch_mm(profile, block, chain[0].truncate());
-            self.chain(&chain, touch_mm, &Travel::new(self.job, self.operation, block));
-            self.cut(first, profile, block);
+            for part in parts(chain, block) {
+                let first = self.moves.len();
+                let touch_mm = touch_mm(profile, block, part[0].truncate());
+                self.chain(&part, touch_mm, &Travel::new(self.job, self.operation, block));
+                self.cut(first, profile, block);
+            }
         }
     }
 

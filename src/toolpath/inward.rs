@@ -107,7 +107,7 @@ impl Inward<'_> {
     ) -> Vec<Span> {
         let runs = match self.only {
             None => vec![curve.to_vec()],
-            Some(only) => runs_with(curve, |p| only.cap_mm(p) > f64::NEG_INFINITY),
+            Some(only) => runs_with(curve, |k| only.cap_mm(curve[k]) > f64::NEG_INFINITY),
         };
         let plans = runs.iter().flat_map(|run| chords(run, PLAN_FIT * self.stepover_mm, |_| true));
         plans.flat_map(|plan| along(site, self.only, &plan, tracer)).collect()

@@ -270,7 +270,7 @@ impl Level<'_> {
         fit_mm: f64,
         free: impl Fn(DVec2) -> bool + Copy,
     ) -> Vec<Vec<DVec2>> {
-        let runs = runs_with(curve, |p| self.has_work(p));
+        let runs = runs_with(curve, |k| self.has_work(curve[k]));
         runs.iter().flat_map(|run| chords(run, fit_mm, free)).collect()
     }
 }

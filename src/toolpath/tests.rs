@@ -28,6 +28,28 @@ fn distance_to_triangle(c: DVec3, t: [DVec3; 3]) -> f64 {
     (0..3).map(|k| to_edge(t[k], t[(k + 1) % 3])).fold(f64::INFINITY, f64::min)
 }
 
+/// Waterlines go where roughing has left wood on a wall, and not round one that it has left clean.
+#[test]
+fn walls_without_wood_get_no_waterlines() {
+    let length = |leave_mm: f64| {
+        let ops = vec![
+            rough(cutter(CutterShape::Flat, 2.0), leave_mm, 1.0),
+            contour(cutter(CutterShape::Ball, 2.0), 0.08, 45.0),
+        ];
+        let job = job(24.0, 18.0, 10.0, 0.25, ops);
+        let target = relief(&job, 5.0, 3.0, &[]);
+        let paths = plan(&job, &(&target).into(), &mut |_| {}).unwrap();
+        let own = paths.iter().filter(|path| path.cutter.shape == CutterShape::Ball);
+        let cuts = own.flat_map(|path| &path.moves).filter(|m| !m.is_rapid());
+        cuts.map(Move::length_mm).sum::<f64>()
+    };
+    // Round the pocket, 2 * (16 + 10) mm: seven levels 0.78 mm apart, but the flank takes 2 mm of the wall at once, so that
+    // three do. A wall between nodes leans by 0.05 mm over each step of the roughing, less than the limit.
+    let (thick, clean) = (length(0.3), length(0.0));
+    assert!((3.0 * 50.0..5.0 * 52.0).contains(&thick), "{thick}");
+    assert!(clean < 0.1 * thick, "{clean} {thick}");
+}
+
 /// Highest point of the triangle within the disc of radius `r` round `c`.
 fn highest_in_disc(c: DVec2, r: f64, t: [DVec3; 3]) -> f64 {
     let mut best = f64::NEG_INFINITY;

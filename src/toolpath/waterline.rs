@@ -10,6 +10,7 @@ use super::contours::{Edge, chords, contours, reached, runs_with};
 use super::emit::Emitter;
 use super::lead::{Side, with_leads};
 use super::left::Surfaces;
+use super::needed::needed;
 use super::order::Direction;
 use super::pocket::{begun_at, is_closed, nearest_vertex};
 use super::raster::{TOP_MM, link};
@@ -25,6 +26,9 @@ use rayon::prelude::*;
 
 /// The lowest level lies this far above the lowest ground that is asked for, mm.
 const ABOVE_GROUND_MM: f64 = 0.002;
+
+/// Greatest height of a wall that the flank of the cutter takes in one cut, in diameters.
+const FLANK_PER_DIAMETER: f64 = 1.0;
 
 /// Radius of the arcs on which waterlines are met and left, in diameters.
 const LEAD_PER_DIAMETER: f64 = 0.25;
@@ -70,12 +74,13 @@ pub(super) fn waterlines(site: &Site, lines: &Waterlines, block: &mut Block, out
     let levels = ((high - low) / lines.step_mm).ceil() as usize;
     for k in 0..levels {
         let z = low + k as f64 * lines.step_mm;
-        let work = |p: DVec2| wanted.cap_mm(p) > f64::NEG_INFINITY;
+        let work = |p: DVec2, _: DVec2| wanted.cap_mm(p) > f64::NEG_INFINITY;
         let spans = lines.spans(&cells, z, &cutter, &work);
         if spans.is_empty() {
             continue;
         }
-        let way = Way { direction: Direction::Fixed, room: &[Side::Left] };
+        let (direction, limit_mm) = (Direction::Fixed, lines.limit_mm);
+        let way = Way { direction, limit_mm, room: &[Side::Left] };
         cutter.ride(site, nearest_first(spans), way, block, out);
         // The flank may have cleared the walls above.
         let Some(still) = left(block) else { return };
@@ -97,7 +102,9 @@ pub(super) struct Contour {
 /// so close that the cusps between them keep to the scallop on the flattest ground that they cross. From one level the
 /// cutter goes down to the next without lifting where that is quicker; such chains of levels are in the order of least
 /// travel, so one may be cut while wood of another still stands above it: no more than roughing has left, whose
-/// thickness sets the feed. The moves go to `out`.
+/// thickness sets the feed. On a wall, the flank of the cutter takes the levels of a diameter's height at once, as far as
+/// that leaves no more than the limit; and no part of a chain is cut where nothing is left to take by then. The moves go
+/// to `out`.
 pub(super) fn contour(
     site: &Site,
     cut: &Contour,
@@ -133,24 +140,37 @@ pub(super) fn contour(
         steep
     };
     let cutter = Rider::new(site, &profile);
-    let work = |p: DVec2| {
+    let is_steep = |p: DVec2| {
         let at = tip.grid().to_grid(p).round().max(DVec2::ZERO);
         let (i, j) = (at.x as usize, at.y as usize);
         i < tip.grid().nx && j < tip.grid().ny && is_steep[j * tip.grid().nx + i]
     };
-    let level = |z: f64| lines.spans(&cells, z, &cutter, &work);
-    let mut levels: Vec<Vec<Span>> = lines.heights(&cells).into_par_iter().map(level).collect();
+    let heights = lines.heights(&cells);
+    let lowest = heights.last().copied().unwrap_or(0.0);
+    let deep_mm = FLANK_PER_DIAMETER * site.operation.cutter.working_mm();
+    let level = |z: f64| {
+        // The lowest of the levels whose wall one cut of the flank may take.
+        let foot = lowest + ((z - lowest) / deep_mm).floor() * deep_mm;
+        let foot = heights.iter().copied().rfind(|h| *h >= foot).unwrap_or(z);
+        let by_flank = |p: DVec2, away: DVec2| {
+            foot < z && cutter.exact.clears(p + away * lines.limit_mm, foot)
+        };
+        let work = |p: DVec2, away: DVec2| is_steep(p) && !by_flank(p, away);
+        lines.spans(&cells, z, &cutter, &work)
+    };
+    let mut levels: Vec<Vec<Span>> = heights.par_iter().map(|&z| level(z)).collect();
     if cut.milling == Some(Milling::Conventional) {
         for span in levels.iter_mut().flatten() {
             span.reverse();
         }
     }
     begin_near(&mut levels);
-    let way = match cut.milling {
-        None => Way { direction: Direction::Both, room: &[Side::Left, Side::Right] },
-        Some(Milling::Climb) => Way { direction: Direction::Fixed, room: &[Side::Left] },
-        Some(Milling::Conventional) => Way { direction: Direction::Fixed, room: &[Side::Right] },
+    let (direction, room): (_, &[Side]) = match cut.milling {
+        None => (Direction::Both, &[Side::Left, Side::Right]),
+        Some(Milling::Climb) => (Direction::Fixed, &[Side::Left]),
+        Some(Milling::Conventional) => (Direction::Fixed, &[Side::Right]),
     };
+    let way = Way { direction, limit_mm: lines.limit_mm, room };
     cutter.ride(site, levels, way, block, out);
     Ok(())
 }
@@ -170,10 +190,12 @@ fn begin_near(levels: &mut [Vec<Span>]) {
     }
 }
 
-/// How lines may be run: in which direction, and on which sides of them there may be room for leads.
+/// How lines may be run: in which direction, where, and on which sides of them there may be room for leads.
 #[derive(Clone, Copy)]
 struct Way<'a> {
     direction: Direction,
+    /// Wood that may stay, mm normal to the surface.
+    limit_mm: f64,
     room: &'a [Side],
 }
 
@@ -226,10 +248,14 @@ impl<'a> Rider<'a> {
         let link = |done: &[DVec3], next: &[DVec3]| link(site, &travel, &tracer, done, next);
         let radius_mm = LEAD_PER_DIAMETER * site.operation.cutter.working_mm();
         let chains = chains(rows, way.direction, link);
-        let chains = chains
-            .into_iter()
-            .map(|chain| with_leads(chain, way.room, radius_mm, |p, z| self.is_free(p, z)));
-        out.passes(chains.collect(), way.direction, &self.profile, block);
+        let parts = |chain: Vec<DVec3>, block: &Block| {
+            let parts = needed(site, &chain, &self.profile, way.limit_mm, block).into_iter();
+            parts
+                .map(|part| with_leads(part, way.room, radius_mm, |p, z| self.is_free(p, z)))
+                .collect()
+        };
+        // Chains go down: from its foot the flank would take all of a wall at once.
+        out.passes_in_parts(chains, Direction::Fixed, &self.profile, block, parts);
     }
 }
 
@@ -251,20 +277,27 @@ impl Waterlines<'_> {
         (0..grid.ny - 1).into_par_iter().flat_map_iter(row).collect()
     }
 
-    /// What is to be cut at height `z`: the stretches of its contours with work, as chords.
+    /// What is to be cut at height `z`: the stretches of its contours with work, as chords. `work` is asked with a point and
+    /// the direction away from the ground.
     fn spans(
         &self,
         cells: &[Cell],
         z: f64,
         cutter: &Rider,
-        work: &(impl Fn(DVec2) -> bool + Sync),
+        work: &(impl Fn(DVec2, DVec2) -> bool + Sync),
     ) -> Vec<Span> {
         let fit_mm = self.fit_mm;
         let contours = self.contours(cells, z, &cutter.exact);
         let inside = |p: &DVec2| cutter.stock.contains(*p);
         let cut = |contour: &Vec<DVec2>| -> Vec<Vec<DVec2>> {
             let parts = contour.chunk_by(|a, b| inside(a) == inside(b));
-            let runs = parts.filter(|part| inside(&part[0])).flat_map(|part| runs_with(part, work));
+            let runs = parts.filter(|part| inside(&part[0])).flat_map(|part| {
+                let away = |k: usize| {
+                    let (from, to) = (k.saturating_sub(1), (k + 1).min(part.len() - 1));
+                    (part[to] - part[from]).normalize_or_zero().perp()
+                };
+                runs_with(part, |k| work(part[k], away(k)))
+            });
             runs.flat_map(|run| chords(&run, fit_mm, |p| cutter.is_free(p, z))).collect()
         };
         let plans = contours.par_iter().flat_map_iter(cut);
