@@ -198,7 +198,7 @@ fn coons_surfaces_fold_over_none_of_the_shapes() {
             };
             let mut ridge = raised.ridge.clone();
             ridge.height_mm = height_mm;
-            let got = raised.skeleton.subdivided(&ridge, &spec, 0.1);
+            let got = raised.skeleton.subdivided(&ridge, &spec, 0.1, &[]);
             let got = got.unwrap_or_else(|why| panic!("{} {draft_rad:?}: {why}", shape.name));
             assert_eq!(got.smoothed, 0, "{} {draft_rad:?} {height_mm}", shape.name);
             let top = got.mesh.vertices.iter().map(|v| v.z).fold(0.0, f64::max);
@@ -277,6 +277,24 @@ fn slope(points: &[[f64; 2]]) -> f64 {
         }
     }
     libm::atan(rows[0][3] / rows[0][0]).to_degrees()
+}
+
+/// A vertex of the mesh inside gets the normal that is asked for beside it, and the heightfield has it there.
+#[test]
+fn coons_surfaces_tilt_where_asked() {
+    let surface = "surface = { method = \"coons\", draft_deg = 30 }\nheight_mm = 5\n";
+    let edit = "[[layer.edit]]\nat = [47, 29]\nnormal = [-0.2, 0.1, 1]\n";
+    let (plain, design) = (relief_of(surface), relief_of(&format!("{surface}{edit}")));
+    let [edited] = design.edited[..] else { panic!("{:?}", design.edited) };
+    assert!(edited.at.distance(DVec2::new(47.0, 29.0)) < 3.0 && edited.height_mm.is_none());
+    let pitch = design.relief.target.grid().pitch_mm;
+    let slope = |design: &relievo::Design| {
+        let z = |x, y| design.relief.target.height_at(edited.at + DVec2::new(x, y)).unwrap();
+        DVec2::new(z(pitch, 0.0) - z(-pitch, 0.0), z(0.0, pitch) - z(0.0, -pitch)) / (2.0 * pitch)
+    };
+    let wanted = DVec2::new(0.2, -0.1);
+    let (before, after) = (slope(&plain), slope(&design));
+    assert!(before.distance(wanted) > 0.1 && after.distance(wanted) < 0.03, "{before} {after}");
 }
 
 /// In the merged heightfield, too, the surface leaves the whole outline at its draft, within 0.6 degrees.

@@ -7,7 +7,7 @@ use toml::de::{DeTable, DeValue};
 use super::colors;
 use super::crest::read_crests;
 use super::draft::{Draft, text_or_form};
-use super::edit::{EditsSpec, read_edits};
+use super::edit::{EditPlace, EditSpec, EditTarget, EditsSpec, read_edits};
 use super::error::{JobError, Source, shown};
 use super::keys::{DRAWN, Key, LAYER, MESHED, METHODS, PROFILES, SLOPE_CAP, SURFACE, rule};
 use super::mesh::{mesh_name, read_mesh};
@@ -219,8 +219,22 @@ fn check_editable(
         SurfaceSpec::Drawn(_) => true,
         _ => matches!(select, Selector::Mesh(_)),
     };
-    if edits.is_none() || edits_it {
-        return Ok(());
+    let Some(edits) = edits.filter(|_| !edits_it) else { return Ok(()) };
+    if let SurfaceSpec::Subdivision(SubdivisionSpec { scheme: Scheme::Coons, .. }) = surface {
+        let tilts = |edit: &EditSpec| {
+            let is_up = edit.normal.is_some_and(|normal| normal.z > 0.0);
+            is_up && matches!((edit.at, &edit.target), (EditPlace::Plan(_), EditTarget::Normal))
+        };
+        if table.raw("edit_rules").is_some() {
+            let message = "edits of a coons surface need no rules: each is met by itself";
+            return Err(table.impossible("edit_rules", message, "without effect", "leave it out"));
+        }
+        if edits.list.iter().all(tilts) {
+            return Ok(());
+        }
+        let message = "an edit of a coons surface tilts it, and nothing else";
+        let help = "give at = [x, y] and normal = [x, y, z] with a z above 0, without a height";
+        return Err(table.impossible("edit", message, "not a tilt", help));
     }
     let message = format!("method \"{}\" cannot be edited", surface.method());
     let help = "shape edits act on Catmull-Clark meshes: write surface = \"catmull-clark\" (or \"crest\" with its ridge \

@@ -15,9 +15,10 @@ use super::{
     EditFault, FINE, Mesh, Over, Patch, Refined, Remark, Rim, RuledFault, Segments, Surface, Way,
     Window, control, draw_to, edits, inscribed_radius, literal, ratio, rim, ruled,
 };
-use crate::geom::{Grid, Tolerance};
+use crate::geom::{DVec2, DVec3, Grid, Tolerance};
 use crate::job::{
-    Control, CrestSpec, EditsSpec, LayerSpec, Scheme, SkeletonSpec, SubdivisionSpec, SurfaceSpec,
+    Control, CrestSpec, EditPlace, EditsSpec, LayerSpec, Scheme, SkeletonSpec, SubdivisionSpec,
+    SurfaceSpec,
 };
 use crate::outline::{Figure, Region};
 use crate::skeleton::{
@@ -222,16 +223,27 @@ impl Part<'_> {
                 let over = if *ridge_true { Over::Ridge } else { Over::Control };
                 Some(skeleton.patches(&ridge, over, &fineness))
             }
-            SurfaceSpec::Subdivision(spec) => match skeleton.subdivided(&ridge, spec, cell) {
-                Ok(raised) => {
-                    raised.remark(remarks);
-                    Some(Ok(match &layer.edits {
-                        Some(edits) if !own.is_empty() => raised.drawn_to(edits, own, remarks)?,
-                        _ => raised.mesh,
-                    }))
+            SurfaceSpec::Subdivision(spec) => {
+                let normals = self.normals(own);
+                match skeleton.subdivided(&ridge, spec, cell, &normals) {
+                    Ok(raised) => {
+                        raised.remark(remarks);
+                        let places = own.iter().zip(&raised.laid);
+                        remarks.extend(places.map(|(&edit, &at)| Remark::EditPlaced {
+                            edit,
+                            at,
+                            height_mm: None,
+                        }));
+                        Some(Ok(match &layer.edits {
+                            Some(edits) if !own.is_empty() && normals.is_empty() => {
+                                raised.drawn_to(edits, own, remarks)?
+                            }
+                            _ => raised.mesh,
+                        }))
+                    }
+                    Err(why) => Some(Err(why)),
                 }
-                Err(why) => Some(Err(why)),
-            },
+            }
             _ => None,
         };
         match mesh {
@@ -250,6 +262,21 @@ impl Part<'_> {
         };
         lower_walls(&mut patch, std::slice::from_ref(region), layer, crest, grid);
         Ok(Surface::Field(patch))
+    }
+
+    /// The normals that edits with these indices ask of a Coons surface, each with its place; none for other surfaces.
+    fn normals(&self, own: &[usize]) -> Vec<(DVec2, DVec3)> {
+        let SurfaceSpec::Subdivision(SubdivisionSpec { scheme: Scheme::Coons, .. }) =
+            self.layer.surface
+        else {
+            return Vec::new();
+        };
+        let list = self.layer.edits.as_ref().map_or(&[][..], |edits| &edits.list);
+        let asked = own.iter().filter_map(|&k| match (list[k].at, list[k].normal) {
+            (EditPlace::Plan(at), Some(normal)) => Some((at, normal)),
+            _ => None,
+        });
+        asked.collect()
     }
 
     /// The skeleton of a calmer copy of a rough outline, and true, when the layer asks for insignificant branches to be
@@ -323,7 +350,7 @@ impl Skeleton {
         Ok(mesh)
     }
 
-    /// The subdivision surface, checked. Where no number of levels is asked for, edges get about two cells of
+    /// The subdivision surface, checked; `normals` are those that a Coons surface has at places. Where no number of levels is asked for, edges get about two cells of
     /// `cell_mm` long; where the scheme folds the plan over itself, as it does between uneven triangles, it is smoothed.
     ///
     /// # Errors
@@ -334,6 +361,7 @@ impl Skeleton {
         ridge: &Ridge,
         spec: &SubdivisionSpec,
         cell_mm: f64,
+        normals: &[(DVec2, DVec3)],
     ) -> Result<Subdivided, RuledFault> {
         let (sampled, cells) = (&self.sampled, &self.cells);
         let on_spokes = spec.scheme == Scheme::Coons && spec.control == Control::Quads;
@@ -345,6 +373,7 @@ impl Skeleton {
         let control = &spoked.mesh;
         let levels = spec.levels.unwrap_or_else(|| levels(control, spec.scheme, cell_mm));
         let draft_rad = spec.draft_rad;
+        let mut laid = Vec::new();
         let fine = match spec.adaptive_mm {
             Some(tolerance_mm) => adaptive(control, tolerance_mm, levels),
             None if spec.scheme == Scheme::Coons => {
@@ -354,7 +383,10 @@ impl Skeleton {
                     steady: true,
                     ..CoonsRules::default()
                 };
-                rim::coons_on(&spoked, rules, levels, &self.sampled)
+                rim::coons_on(&spoked, rules, levels, &self.sampled, normals).map(|(fine, at)| {
+                    laid = at;
+                    fine
+                })
             }
             None => subdivide(control, spec.scheme, levels),
         };
@@ -371,7 +403,7 @@ impl Skeleton {
             ruled::check_area(covered, &self.sampled)?;
         }
         let covered = covered / ruled::area_of(&self.sampled);
-        Ok(Subdivided { mesh, covered, smoothed, control: spoked.mesh, levels, fine })
+        Ok(Subdivided { mesh, covered, smoothed, control: spoked.mesh, levels, fine, laid })
     }
 }
 
@@ -389,6 +421,8 @@ pub struct Subdivided {
     levels: u32,
     /// Its polygons, before they were cut and smoothed.
     fine: PolyMesh,
+    /// Where the vertices lie that got a normal of their own.
+    laid: Vec<DVec2>,
 }
 
 impl Subdivided {

@@ -67,7 +67,8 @@ pub(super) fn follow(mesh: &mut Mesh, control: &PolyMesh, sampled: &Sampled) {
 
 /// A Coons surface whose rim lies on the outline at every level, and runs as it does: so its slope there is that of its
 /// rules. Edges of the rim whose ends do not follow each other on one ring stay as they come. Nothing lies higher or lower
-/// than the vertices of the control mesh do.
+/// than the vertices of the control mesh do, but for higher ground beside `normals`. Each of the `normals` is that of the vertex inside which lies nearest to its place;
+/// where these are, in plan, comes with the mesh.
 ///
 /// # Errors
 /// [`SubdivideError`]: the mesh is no manifold, or gets too large.
@@ -76,7 +77,8 @@ pub(super) fn coons_on(
     rules: CoonsRules,
     levels: u32,
     sampled: &Sampled,
-) -> Result<PolyMesh, SubdivideError> {
+    normals: &[(DVec2, DVec3)],
+) -> Result<(PolyMesh, Vec<DVec2>), SubdivideError> {
     let mut coons = CoonsMesh::new(control.mesh.clone(), rules)?;
     control.lead(&mut coons);
     // Only ever asked for a key.
@@ -104,6 +106,16 @@ pub(super) fn coons_on(
         };
         coons.lead(v, forward.normalize_or_zero(), back.normalize_or_zero());
     }
+    let mut laid = Vec::with_capacity(normals.len());
+    for &(place, normal) in normals {
+        let inside = (0..control.mesh.vertices.len() as u32).filter(|v| !places.contains_key(v));
+        let far = |v: &u32| at(*v).distance_squared(place);
+        let nearest = inside.min_by(|a, b| far(a).total_cmp(&far(b)));
+        if let Some(v) = nearest {
+            coons.lay(v, normal.normalize_or(DVec3::Z));
+        }
+        laid.push(nearest.map_or(place, at));
+    }
     for _ in 0..levels {
         let mut put = BTreeMap::new();
         for [from, to, new] in coons.rim() {
@@ -119,9 +131,11 @@ pub(super) fn coons_on(
     let mut mesh = coons.into_mesh();
     let heights = || control.mesh.vertices.iter().map(|v| v.z);
     let low = heights().fold(f64::INFINITY, f64::min);
-    let high = heights().fold(f64::NEG_INFINITY, f64::max);
+    // Beside a tilted crest it rises above it.
+    let top = if normals.is_empty() { f64::NEG_INFINITY } else { f64::INFINITY };
+    let high = heights().fold(top, f64::max);
     mesh.vertices.iter_mut().for_each(|v| v.z = v.z.max(low).min(high));
-    Ok(mesh)
+    Ok((mesh, laid))
 }
 
 /// The curve from one vertex to the next: itself, the first one's place and how far the next one is.

@@ -97,6 +97,20 @@ fn wrong_edits_are_refused_at_their_place() {
         layer("[[layer.edit]]\nat = [1, 2]\nheight_mm = 1\n").replace("catmull-clark", "ruled");
     let error = job(&ruled).unwrap_err().to_string();
     assert!(error.contains("cannot be edited") && error.contains("\"catmull-clark\""), "{error}");
+    // A coons surface can be tilted, and no more.
+    let coons = |rest: &str| job(&layer(rest).replace("catmull-clark", "coons"));
+    assert!(coons("[[layer.edit]]\nat = [1, 2]\nnormal = [0.1, 0, 1]\n").is_ok());
+    for rest in [
+        "[[layer.edit]]\nat = [1, 2]\nheight_mm = 1\nnormal = [0, 0, 1]\n",
+        "[[layer.edit]]\nface = 2\nnormal = [0, 0, 1]\n",
+        "[[layer.edit]]\nat = [1, 2]\nnormal = [1, 0, 0]\n",
+    ] {
+        let error = coons(rest).unwrap_err().to_string();
+        assert!(error.contains("tilts it, and nothing else"), "{rest}\n{error}");
+    }
+    let rules = "edit_rules = { rings = 4 }\n[[layer.edit]]\nat = [1, 2]\nnormal = [0.1, 0, 1]\n";
+    let error = coons(rules).unwrap_err().to_string();
+    assert!(error.contains("edit_rules") && error.contains("coons"), "{error}");
     let many = "[[layer.edit]]\nat = [1, 2]\nheight_mm = 1\n".repeat(MOST_EDITS + 1);
     assert!(job(&layer(&many)).unwrap_err().to_string().contains("the limit is 100"));
 }
