@@ -5,11 +5,14 @@ use super::emit::feed_seconds;
 use super::travel::Travel;
 use crate::cutter::Profile;
 use crate::geom::{DVec3, Move, MoveKind};
+use crate::job::Operation;
 use crate::stock::Block;
 use rayon::prelude::*;
 
 /// Parts begin and end at least this far beyond the wood, mm.
 const ROOM_MM: f64 = 0.5;
+/// Way that the leads and the entry of one more part take, in diameters.
+const LEADS_PER_DIAMETER: f64 = 2.0;
 
 /// The parts of a way on which the cutter would meet wood that lies more than `limit_mm` inside it, with a little room at both
 /// ends. Ways through air between two of them stay where lifting is slower.
@@ -41,9 +44,11 @@ pub(super) fn needed(
     parts.into_iter().map(|(from, to)| way[from..=to].to_vec()).collect()
 }
 
-/// True when lifting is slower than going on.
+/// True when lifting, and coming in again, is slower than going on.
 fn stays(site: &Site, travel: &Travel, way: &[DVec3]) -> bool {
-    feed_seconds(site, way) <= travel.lift_seconds(way[0], way[way.len() - 1])
+    let Operation { cutter, feed_mm_per_min, .. } = site.operation;
+    let leads_s = 60.0 * LEADS_PER_DIAMETER * cutter.working_mm() / feed_mm_per_min;
+    feed_seconds(site, way) <= travel.lift_seconds(way[0], way[way.len() - 1]) + leads_s
 }
 
 /// The vertex that lies [`ROOM_MM`] of way before or after one, or at the end.

@@ -254,8 +254,7 @@ impl<'a> Rider<'a> {
                 .map(|part| with_leads(part, way.room, radius_mm, |p, z| self.is_free(p, z)))
                 .collect()
         };
-        // Chains go down: from its foot the flank would take all of a wall at once.
-        out.passes_in_parts(chains, Direction::Fixed, &self.profile, block, parts);
+        out.passes_in_parts(chains, way.direction, &self.profile, block, parts);
     }
 }
 
