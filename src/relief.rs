@@ -105,7 +105,8 @@ pub enum ReliefError {
     /// The relief rises above the stock's top.
     #[error(
         "{what} rises {by_mm:.3} mm above the top of the stock at {x_mm:.1}, {y_mm:.1}; set relief.depth_mm to \
-         {depth_mm:.2} or more, or lower the layers there by {by_mm:.3} mm (height_mm, base_mm, offset_mm)"
+         {depth_mm:.2} or more, or lower the layers there by {by_mm:.3} mm (height_mm, base_mm, offset_mm, \
+         or what their edits ask for)"
     )]
     PokesOut {
         /// The layer that put it there, or the background.

@@ -694,7 +694,8 @@ pub(super) static LAYER: Section = Section {
             "edit",
             Kind::Forms("[[layer.edit]] tables"),
             Rule("none"),
-            "catmull-clark, crest and mesh: places that the surface is drawn to, each a [[layer.edit]]; coons: places where it is tilted",
+            "catmull-clark, crest and mesh: places that the surface is drawn to, each a [[layer.edit]]; coons: places where it \
+             is tilted",
         ),
         key(
             "edit_rules",

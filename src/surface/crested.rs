@@ -350,8 +350,9 @@ impl Skeleton {
         Ok(mesh)
     }
 
-    /// The subdivision surface, checked; `normals` are those that a Coons surface has at places. Where no number of levels is asked for, edges get about two cells of
-    /// `cell_mm` long; where the scheme folds the plan over itself, as it does between uneven triangles, it is smoothed.
+    /// The subdivision surface, checked; `normals` are those that a Coons surface has at places. Where no number of levels is
+    /// asked for, edges get about two cells of `cell_mm` long; where the scheme folds the plan over itself, as it does between
+    /// uneven triangles, it is smoothed.
     ///
     /// # Errors
     /// Which check failed, and where. An approximating scheme draws the outline in, so that the area is no fault of

@@ -67,8 +67,8 @@ pub(super) fn follow(mesh: &mut Mesh, control: &PolyMesh, sampled: &Sampled) {
 
 /// A Coons surface whose rim lies on the outline at every level, and runs as it does: so its slope there is that of its
 /// rules. Edges of the rim whose ends do not follow each other on one ring stay as they come. Nothing lies higher or lower
-/// than the vertices of the control mesh do, but for higher ground beside `normals`. Each of the `normals` is that of the vertex inside which lies nearest to its place;
-/// where these are, in plan, comes with the mesh.
+/// than the vertices of the control mesh do, but for higher ground beside `normals`: each of these is that of the vertex inside
+/// which lies nearest to its place. Where those vertices are, in plan, comes with the mesh.
 ///
 /// # Errors
 /// [`SubdivideError`]: the mesh is no manifold, or gets too large.
