@@ -27,7 +27,8 @@ use rayon::prelude::*;
 /// The lowest level lies this far above the lowest ground that is asked for, mm.
 const ABOVE_GROUND_MM: f64 = 0.002;
 
-/// Greatest height of a wall that the flank of the cutter takes in one cut, in diameters.
+/// Height of the bands of levels of which the lowest may do for the others on a wall, in diameters. What is thicker than a
+/// finishing cut has been cleared before; how high a wall stands beside the cutter depends on the order of the chains, too.
 const FLANK_PER_DIAMETER: f64 = 1.0;
 
 /// Radius of the arcs on which waterlines are met and left, in diameters.
@@ -102,9 +103,8 @@ pub(super) struct Contour {
 /// so close that the cusps between them keep to the scallop on the flattest ground that they cross. From one level the
 /// cutter goes down to the next without lifting where that is quicker; such chains of levels are in the order of least
 /// travel, so one may be cut while wood of another still stands above it: no more than roughing has left, whose
-/// thickness sets the feed. On a wall, the flank of the cutter takes the levels of a diameter's height at once, as far as
-/// that leaves no more than the limit; and no part of a chain is cut where nothing is left to take by then. The moves go
-/// to `out`.
+/// thickness sets the feed. On a wall, levels are left out where the flank leaves no more than the limit from the lowest one of
+/// their band; and no part of a chain is cut where nothing is left to take when it begins. The moves go to `out`.
 pub(super) fn contour(
     site: &Site,
     cut: &Contour,
@@ -149,7 +149,7 @@ pub(super) fn contour(
     let lowest = heights.last().copied().unwrap_or(0.0);
     let deep_mm = FLANK_PER_DIAMETER * site.operation.cutter.working_mm();
     let level = |z: f64| {
-        // The lowest of the levels whose wall one cut of the flank may take.
+        // The lowest level of the band.
         let foot = lowest + ((z - lowest) / deep_mm).floor() * deep_mm;
         let foot = heights.iter().copied().rfind(|h| *h >= foot).unwrap_or(z);
         let by_flank = |p: DVec2, away: DVec2| {
