@@ -336,10 +336,11 @@ impl Controller {
         }
     }
 
-    /// The EEPROM has taken bytes: what comes over the wire meanwhile is lost.
+    /// The EEPROM takes bytes: what comes over the wire meanwhile is lost, and the answer waits until they are written.
     fn wrote(&mut self, bytes: usize) {
         let begin_s = self.interrupts_off_until_s.max(self.now_s);
         self.interrupts_off_until_s = begin_s + bytes as f64 * EEPROM_BYTE_S;
+        self.busy_until_s = self.busy_until_s.max(self.interrupts_off_until_s);
     }
 
     fn settings_changed(&mut self) {
@@ -528,7 +529,7 @@ impl Controller {
             self.obeyed.push(String::from_utf8_lossy(&line.text).into_owned());
         }
         match done {
-            Ok(()) if self.tasks.is_empty() => self.say_ok(),
+            Ok(()) if self.tasks.is_empty() && !self.is_busy() => self.say_ok(),
             Ok(()) => self.tasks.push_back(Task::Ok),
             Err(refusal) => self.say(&refusal.to_string()),
         }

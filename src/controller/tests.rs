@@ -341,6 +341,21 @@ fn an_eeprom_write_deafens_the_controller_for_a_while() {
 }
 
 #[test]
+fn whoever_waits_for_the_answer_to_an_eeprom_write_is_heard() {
+    let mut c = quick();
+    for line in ["$110=3000\n", "G10L2P1X1\n", "$N0=G55\n", "$I=mine\n"] {
+        c.feed(line.as_bytes());
+        let mut said = Vec::new();
+        while !said.ends_with(b"ok\r\n") {
+            c.advance(1e-4);
+            said.extend(c.take_output());
+            assert!(c.now_s() < 60.0, "{line:?}: {}", said.escape_ascii());
+        }
+        assert_eq!(after(&mut c, b"G90\n", 0.01), "ok\r\n", "after {line:?}");
+    }
+}
+
+#[test]
 fn g10_writes_in_check_mode_too() {
     let mut c = quick();
     after(&mut c, b"$C\n", 0.1);
