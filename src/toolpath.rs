@@ -16,6 +16,7 @@ mod contours;
 mod emit;
 mod finish;
 mod fit;
+mod hop;
 mod inward;
 mod lead;
 mod left;

@@ -2,6 +2,7 @@
 
 use super::Site;
 use super::arcs::{Arc, Fitter};
+use super::hop::hop;
 use super::order::{Direction, in_order};
 use super::ramp::ramp_onto;
 use super::trace::{DROP_MM, LEAST_ROUNDING_MM};
@@ -127,43 +128,34 @@ impl<'a> Emitter<'a> {
         direction: Direction,
         profile: &Profile,
         block: &mut Block,
-        parts: impl Fn(Vec<DVec3>, &Block) -> Vec<Vec<DVec3>>,
+        mut parts: impl FnMut(Vec<DVec3>, &Block) -> Vec<Vec<DVec3>>,
     ) {
         for chain in in_order(chains, direction, self.at()) {
             for part in parts(chain, block) {
                 let first = self.moves.len();
-                let touch_mm = touch_mm(profile, block, part[0].truncate());
-                self.chain(&part, touch_mm, &Travel::new(self.job, self.operation, block));
+                self.chain(&part, profile, block);
                 self.cut(first, profile, block);
             }
         }
     }
 
-    /// Goes to the start of the chain, enters and cuts; the tool stays down. `wood_mm`: the height of the tip at which the
-    /// cutter touches wood at the start; `travel`: over the wood as it is. A chain without room to ramp is only counted.
-    pub(super) fn chain(&mut self, chain: &[DVec3], wood_mm: f64, travel: &Travel) {
+    /// Goes to the start of the chain, enters and cuts; the tool stays down. `block`: the wood as it is. A chain without room
+    /// to ramp is only counted.
+    fn chain(&mut self, chain: &[DVec3], profile: &Profile, block: &Block) {
         let safe_z_mm = self.job.safe_z_mm;
-        let ramp_z = wood_mm + ramp_gap_mm(wood_mm);
-        let ramp_z = ramp_z.max(chain[0].z).min(safe_z_mm.max(chain[0].z));
+        let wood_mm = touch_mm(profile, block, chain[0].truncate());
+        // Where the cutter touches no wood at the start it goes straight there.
+        let ramp_z = if wood_mm > chain[0].z { wood_mm + ramp_gap_mm(wood_mm) } else { chain[0].z };
+        let ramp_z = ramp_z.min(safe_z_mm.max(chain[0].z));
         let Some(entry) = ramp_onto(chain, ramp_z, libm::tan(self.job.ramp_rad)) else {
             self.skipped += 1;
             return;
         };
-        let mut above = on_program_grid(entry[0].with_z(safe_z_mm));
-        if let Some(last) = self.moves.last() {
-            let from = last.to;
-            let height_mm = travel.height_mm(from.truncate(), above.truncate());
-            above = on_program_grid(above.with_z(height_mm.max(from.z)));
-            let lifted = from.with_z(above.z);
-            self.rapid(from, lifted);
-            self.rapid(lifted, above);
-        } else {
+        if self.moves.is_empty() {
             self.moves.reserve(chain.len());
         }
-        let low = (wood_mm.max(chain[0].z) + self.job.clearance_mm).min(above.z);
-        let low = on_program_grid(above.with_z(low));
-        self.rapid(above, low);
-        let mut at = low;
+        let travel = Travel::new(self.job, self.operation, block);
+        let mut at = self.go(on_program_grid(entry[0]), wood_mm.max(chain[0].z), profile, &travel);
         for &p in entry.iter().chain(&chain[1..]) {
             let to = on_program_grid(p);
             // Points closer together than the program can say: the last digit alone is no reason for a plunge.
@@ -171,6 +163,41 @@ impl<'a> Emitter<'a> {
                 at = self.feed(at, to);
             }
         }
+    }
+
+    /// Goes to `to`, over wood that the cutter there would touch at height `touch_mm`, and says where the tip is then: there
+    /// after a hop, else `clearance_mm` above the wood.
+    fn go(&mut self, to: DVec3, touch_mm: f64, profile: &Profile, travel: &Travel) -> DVec3 {
+        let job = self.job;
+        let Some(from) = self.at() else {
+            let above = to.with_z(job.safe_z_mm);
+            let low = above.with_z((touch_mm + job.clearance_mm).min(above.z));
+            let low = on_program_grid(low);
+            self.rapid(above, low);
+            return low;
+        };
+        let height_mm = travel.height_mm(from.truncate(), to.truncate());
+        let above = on_program_grid(to.with_z(height_mm.max(from.z)));
+        let low = on_program_grid(above.with_z((touch_mm + job.clearance_mm).min(above.z)));
+        let rapid = |from, to| Move { from, to, kind: MoveKind::Rapid, line: 0 };
+        let lifted = from.with_z(above.z);
+        let entry = Move { from: low, to, kind: self.kind_in_air(to - low), line: 0 };
+        let lift = [rapid(from, lifted), rapid(lifted, above), rapid(above, low), entry];
+        let over = (profile, &self.slim);
+        if let Some(way) = hop(job, self.operation, travel, over, (from, to), &lift) {
+            let way = way.into_iter().map(on_program_grid).chain([to]);
+            return way.fold(from, |at, p| self.feed(at, p));
+        }
+        for m in &lift[..3] {
+            self.rapid(m.from, m.to);
+        }
+        low
+    }
+
+    fn kind_in_air(&self, way: DVec3) -> MoveKind {
+        let feed_mm_per_min =
+            feed_in_air(way, self.operation.feed_mm_per_min, self.operation, &self.job.machine);
+        MoveKind::Feed { feed_mm_per_min }
     }
 
     /// Done with a set of passes, whose moves begin at `first`: makes arcs of them where that saves lines, takes them out of
@@ -219,6 +246,16 @@ impl<'a> Emitter<'a> {
                 let way = m.to - m.from;
                 let speed = feed_in_air(way, base, self.operation, &self.job.machine);
                 speeds[k] = speeds[k].max(speed);
+            }
+        }
+        if first > 0 && !self.moves[first - 1].is_rapid() {
+            // What goes on from the end of a cut may be said to meet the wood of that: there it is not faster than usual.
+            let starts = moves
+                .iter()
+                .scan(0.0, |way_mm, m| Some(std::mem::replace(way_mm, *way_mm + m.length_mm())));
+            let near = starts.take_while(|s| *s <= NEARBY_MM);
+            for (speed, _) in speeds.iter_mut().zip(near) {
+                *speed = speed.min(base);
             }
         }
         for arc in &self.arcs[first_arc..] {
@@ -305,7 +342,12 @@ pub(super) fn feed(
 }
 
 /// As [`feed`], for a way that meets no wood: the plunge limit does not hold.
-fn feed_in_air(way: DVec3, most_mm_per_min: f64, operation: &Operation, machine: &Machine) -> f64 {
+pub(super) fn feed_in_air(
+    way: DVec3,
+    most_mm_per_min: f64,
+    operation: &Operation,
+    machine: &Machine,
+) -> f64 {
     let length = way.length();
     let mut most = most_mm_per_min;
     for axis in 0..3 {

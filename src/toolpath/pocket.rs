@@ -13,6 +13,7 @@ use super::chain::Span;
 use super::contours::{Cells, Edge, checked, chords, reached, runs_with};
 use super::emit::{Emitter, feed_seconds};
 use super::levels::levels;
+use super::needed::Needed;
 use super::order::Direction;
 use super::rows::rim;
 use super::trace::{DROP_MM, LEAST_ROUNDING_MM};
@@ -117,7 +118,10 @@ pub(super) fn pockets(
             is_pointed,
         };
         let chains = level.chains(site, &Travel::new(site.job, site.operation, block));
-        out.passes(chains, Direction::Fixed, &profile, block);
+        let mut needed = Needed::new(site, &profile, FILM_MM, block);
+        out.passes_in_parts(chains, Direction::Fixed, &profile, block, |chain, block| {
+            needed.parts(&chain, block)
+        });
     }
     Ok(())
 }

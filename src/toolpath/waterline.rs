@@ -10,7 +10,7 @@ use super::contours::{Edge, chords, contours, reached, runs_with};
 use super::emit::Emitter;
 use super::lead::{Side, with_leads};
 use super::left::Surfaces;
-use super::needed::needed;
+use super::needed::Needed;
 use super::order::Direction;
 use super::pocket::{begun_at, is_closed, nearest_vertex};
 use super::raster::{TOP_MM, link};
@@ -248,8 +248,9 @@ impl<'a> Rider<'a> {
         let link = |done: &[DVec3], next: &[DVec3]| link(site, &travel, &tracer, done, next);
         let radius_mm = LEAD_PER_DIAMETER * site.operation.cutter.working_mm();
         let chains = chains(rows, way.direction, link);
+        let mut needed = Needed::new(site, &self.profile, way.limit_mm, block);
         let parts = |chain: Vec<DVec3>, block: &Block| {
-            let parts = needed(site, &chain, &self.profile, way.limit_mm, block).into_iter();
+            let parts = needed.parts(&chain, block).into_iter();
             parts
                 .map(|part| with_leads(part, way.room, radius_mm, |p, z| self.is_free(p, z)))
                 .collect()

@@ -1,0 +1,192 @@
+//! Hops: from the end of one cut to the start of the next with the tool just over the wood, where that is quicker than
+//! lifting.
+//!
+//! ```text
+//!            _______
+//!         .-'  gap  `-.       the tip of the cutter on its way: the shortest way (a taut string) over
+//!       .'   _______   `.     the heights at which it touches the wood, and a gap
+//!     *'  .-'       `-.  `*
+//!      `-'             `-'
+//! ```
+
+use super::emit::feed_in_air;
+use super::travel::{Travel, ramp_gap_mm};
+use crate::cutter::Profile;
+use crate::geom::{DVec2, DVec3, Move, MoveKind};
+use crate::job::{Job, Operation};
+use crate::motion;
+use crate::offset::Dropper;
+
+/// Between two drops a node's spacing apart, how high a cutter touches is not known: so many drops to a spacing.
+const DROPS_PER_NODE: f64 = 4.0;
+
+/// No clamp stands on a strip of untouched stock that is this narrow, between two cuts, mm.
+const STRIP_MM: f64 = 5.0;
+
+/// The way of the tip from `from`, where the cutter stands, to `to`, both left out, as feed moves go it: a gap over the wood
+/// as it is and over what the operation has to keep off (`ground`). `None` where lifting (`lift`: the moves of that way) is
+/// quicker, or where ground has not been carved on which a clamp may stand.
+pub(super) fn hop(
+    job: &Job,
+    operation: &Operation,
+    travel: &Travel,
+    (profile, ground): (&Profile, &Dropper),
+    (from, to): (DVec3, DVec3),
+    lift: &[Move],
+) -> Option<Vec<DVec3>> {
+    let machine = &job.machine;
+    let feeds = |points: &[DVec3]| -> Vec<Move> {
+        let leg = |e: &[DVec3]| {
+            let feed_mm_per_min =
+                feed_in_air(e[1] - e[0], operation.feed_mm_per_min, operation, machine);
+            Move { from: e[0], to: e[1], kind: MoveKind::Feed { feed_mm_per_min }, line: 0 }
+        };
+        points.windows(2).filter(|e| e[0] != e[1]).map(leg).collect()
+    };
+    let lift_s = motion::seconds(lift, machine);
+    let (a, b) = (from.truncate(), to.truncate());
+    if motion::seconds(&feeds(&[from, to]), machine) >= lift_s {
+        return None;
+    }
+    let is_carved = travel.is_carved(a, b);
+    if !is_carved && a.distance(b) > operation.cutter.diameter_mm + STRIP_MM {
+        return None;
+    }
+    let mut heights = heights(travel, profile, a, b)?;
+    if !is_carved {
+        let length = a.distance(b);
+        for (s, z) in &mut heights {
+            *z = z.max(ground.drop(a.lerp(b, *s / length)) + GROUND_GAP_MM);
+        }
+    }
+    let way = taut(from, to, &heights);
+    let lowest_mm = way.iter().map(|p| p.z).fold(from.z.min(to.z), f64::min);
+    let points: Vec<DVec3> = [from].into_iter().chain(way.iter().copied()).chain([to]).collect();
+    (motion::seconds(&feeds(&points), machine) < lift_s && travel.shank_passes(a, b, lowest_mm))
+        .then_some(way)
+}
+
+/// Gap over what an operation has to keep off, mm.
+const GROUND_GAP_MM: f64 = 0.1;
+
+/// Distance from `a` and height of the tip, a gap over where the cutter touches the wood, for places on the way to `b`.
+fn heights(travel: &Travel, profile: &Profile, a: DVec2, b: DVec2) -> Option<Vec<(f64, f64)>> {
+    let field = travel.wood().field();
+    let radius_mm = profile.radius_mm() + 0.5 * a.distance(b);
+    let near = field.near(a.midpoint(b), radius_mm)?;
+    let dropper = Dropper::new(&near, profile.clone());
+    let mut heights = Vec::new();
+    dropper.drop_line(a, b, near.grid().pitch_mm / DROPS_PER_NODE, &mut heights);
+    for (_, z) in &mut heights {
+        *z += ramp_gap_mm(*z);
+    }
+    Some(heights)
+}
+
+/// The corners of the taut string from `from` to `to` over points given by their distance from `from` in plan and their
+/// height: their upper convex hull (Andrew 1979).
+fn taut(from: DVec3, to: DVec3, heights: &[(f64, f64)]) -> Vec<DVec3> {
+    let length = from.truncate().distance(to.truncate());
+    let inner = heights.iter().copied().filter(|(s, z)| *s > 0.0 && *s < length && z.is_finite());
+    let mut hull: Vec<(f64, f64)> = vec![(0.0, from.z)];
+    for p in inner.chain([(length, to.z)]) {
+        while let [.., o, q] = hull[..]
+            && (q.0 - o.0) * (p.1 - o.1) >= (q.1 - o.1) * (p.0 - o.0)
+        {
+            hull.pop();
+        }
+        hull.push(p);
+    }
+    let at = |(s, z): (f64, f64)| from.truncate().lerp(to.truncate(), s / length).extend(z);
+    hull[1..hull.len() - 1].iter().map(|&p| at(p)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geom::{Grid, Heightfield};
+    use crate::job::CutterShape;
+    use crate::stock::Block;
+    use crate::toolpath::fixture::{cutter, finish, job};
+    use proptest::prelude::*;
+
+    proptest! {
+        /// Against brute force: the lowest string is, at each place, the highest of all chords between two points.
+        #[test]
+        fn a_string_is_taut(
+            zs in prop::collection::vec(-5.0..0.0_f64, 2..12),
+            (z0, z1) in (-5.0..0.0_f64, -5.0..0.0_f64),
+        ) {
+            let n = zs.len() + 1;
+            let heights: Vec<(f64, f64)> =
+                zs.iter().enumerate().map(|(k, z)| ((k + 1) as f64, *z)).collect();
+            let (from, to) = (DVec3::new(0.0, 0.0, z0), DVec3::new(n as f64, 0.0, z1));
+            let way = taut(from, to, &heights);
+            let string: Vec<DVec3> = [from].into_iter().chain(way).chain([to]).collect();
+            let given: Vec<(f64, f64)> =
+                [(0.0, z0)].into_iter().chain(heights).chain([(n as f64, z1)]).collect();
+            for &(s, _) in &given {
+                let leg = string.windows(2).find(|e| e[0].x <= s && s <= e[1].x).unwrap();
+                let here = leg[0].lerp(leg[1], (s - leg[0].x) / (leg[1].x - leg[0].x)).z;
+                let mut highest = f64::NEG_INFINITY;
+                for a in given.iter().filter(|a| a.0 <= s) {
+                    for b in given.iter().filter(|b| b.0 >= s) {
+                        let t = if a.0 == b.0 { 0.0 } else { (s - a.0) / (b.0 - a.0) };
+                        highest = highest.max(a.1 + t * (b.1 - a.1));
+                    }
+                }
+                prop_assert!((here - highest).abs() < 1e-9, "{here} {highest} at {s}");
+            }
+        }
+    }
+
+    /// Pockets at both sides of a ridge, in ground that is carved but for a narrow and a wide strip, and a clamp.
+    #[test]
+    fn hops_go_over_ridges_and_keep_off_what_may_hold_a_clamp() {
+        let job = job(60.0, 20.0, 12.0, 0.1, vec![finish(cutter(CutterShape::Ball, 2.0), 0.02)]);
+        let grid = Grid::covering(DVec2::ZERO, 60.0, 20.0, 0.1).unwrap();
+        let strips = |p: DVec2, others: f32| match p.x {
+            x if (9.5..=10.5).contains(&x) => -1.5,
+            x if (30.0..=31.0).contains(&x) || (40.0..=48.0).contains(&x) => 0.0,
+            _ => others,
+        };
+        let wood = Heightfield::from_fn(grid, |p| f64::from(strips(p, -4.0)));
+        let block = Block::from_field(&job.stock, wood);
+        let operation = &job.operations[0];
+        let profile = Profile::of(&operation.cutter);
+        let travel = Travel::new(&job, operation, &block);
+        let kind = MoveKind::Rapid;
+        let lift = |from: DVec3, to: DVec3, high_mm: f64| {
+            [
+                (from, from.with_z(high_mm)),
+                (from.with_z(high_mm), to.with_z(high_mm)),
+                (to.with_z(high_mm), to),
+            ]
+            .map(|(from, to)| Move { from, to, kind, line: 0 })
+        };
+        let hop = |x: [f64; 2], high_mm: f64, clamp_mm: f64| {
+            let [from, to] = x.map(|x| DVec3::new(x, 5.0, -4.0));
+            let ground = Heightfield::from_fn(grid, |p| {
+                if (30.0..=31.0).contains(&p.x) { clamp_mm } else { -6.0 }
+            });
+            let ground = Dropper::new(&ground, profile.clone());
+            let lift = lift(from, to, high_mm);
+            let way = hop(&job, operation, &travel, (&profile, &ground), (from, to), &lift)?;
+            let way: Vec<DVec3> = [from].into_iter().chain(way).chain([to]).collect();
+            let kind = MoveKind::Feed { feed_mm_per_min: 1000.0 };
+            for e in way.windows(2) {
+                let leg = Move { from: e[0], to: e[1], kind, line: 0 };
+                assert!(block.is_clear_of(&profile, &leg), "{leg:?}");
+            }
+            Some(way.iter().map(|p| p.z).fold(f64::NEG_INFINITY, f64::max))
+        };
+        let near = |top: Option<f64>, z: f64| top.is_some_and(|top| (top - z).abs() < 0.01);
+        assert!(near(hop([8.0, 12.0], 5.0, -6.0), -1.5 + ramp_gap_mm(-1.5)));
+        // Rapids are quicker on a long way.
+        assert_eq!(hop([12.0, 28.0], -3.9, -6.0), None);
+        // Over the narrow strip, and over what stands on it; not over the wide one, nor from afar.
+        assert!(near(hop([28.0, 33.0], 9.0, -6.0), ramp_gap_mm(0.0)));
+        assert!(near(hop([28.0, 33.0], 9.0, 2.0), 2.0 + GROUND_GAP_MM));
+        assert_eq!(hop([38.0, 50.0], 20.0, -6.0), None);
+    }
+}
