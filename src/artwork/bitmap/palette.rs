@@ -27,6 +27,12 @@ const LEAST_PATCHES: u32 = 4;
 /// a blend of others.
 const LEAST_SHARE: f64 = 5e-5;
 
+/// Scaling with a sharp filter leaves thin seams beside borders, a little beyond the colour there: a colour at most this far
+/// (of 255) from another one that has this many times as many pixels, with fewer patches than this share of its own pixels.
+const SEAM: f64 = 48.0;
+const SEAM_TIMES: u32 = 20;
+const SEAM_PATCHES: f64 = 0.8;
+
 /// Quiet pixels differ from their neighbours by at most this much in each channel.
 const QUIET: u8 = 12;
 
@@ -142,14 +148,20 @@ fn flat(counts: &[([u8; 4], u32, u32)], pixels: usize) -> Option<Vec<[u8; 4]>> {
     if counts.len() <= 2 {
         return Some(counts.iter().map(|c| c.0).collect());
     }
-    let mut inks: Vec<[u8; 4]> =
-        counts.iter().filter(|c| c.2 >= LEAST_PATCHES).map(|c| c.0).collect();
+    let is_seam = |&(ink, pixels, patches): &([u8; 4], u32, u32)| {
+        let near = |other: [u8; 4]| distance2(&reckoned(other), &reckoned(ink)) <= SEAM * SEAM;
+        f64::from(patches) < SEAM_PATCHES * f64::from(pixels)
+            && counts.iter().any(|c| c.1 / SEAM_TIMES >= pixels && near(c.0))
+    };
+    let in_patches = counts.iter().filter(|c| c.2 >= LEAST_PATCHES && !is_seam(c));
+    let mut inks: Vec<[u8; 4]> = in_patches.map(|c| c.0).collect();
     if inks.is_empty() || inks.len() > MOST {
         return None;
     }
     // Lines one pixel wide have no patches. Most frequent first, so that blends meet what they are blends of.
     let least = LEAST_PATCHES.max((pixels as f64 * LEAST_SHARE) as u32);
-    for (ink, ..) in counts.iter().filter(|c| c.2 < LEAST_PATCHES && c.1 >= least) {
+    let thin = counts.iter().filter(|c| c.2 < LEAST_PATCHES && c.1 >= least && !is_seam(c));
+    for (ink, ..) in thin {
         let c = reckoned(*ink);
         let known: Vec<Ink> = inks.iter().map(|ink| reckoned(*ink)).collect();
         let blend = known.iter().enumerate().any(|(k, a)| {
@@ -309,6 +321,33 @@ mod tests {
         let rows = ["........", "........", "rrrrrrrr", "........", "########", "########"];
         let found = find(&picture(8, &rows, &color), 16);
         assert_eq!(found.inks.len(), 3);
+    }
+
+    /// A bar that was scaled with a sharp filter: a darker seam just inside it, a lighter one outside.
+    #[test]
+    fn a_seam_beside_a_border_is_no_colour() {
+        let color = |c: char| match c {
+            '#' => [30, 30, 35, 255],
+            'd' => [12, 12, 18, 255],
+            'l' => [220, 220, 220, 255],
+            'r' => [255, 0, 0, 255],
+            _ => [200, 200, 200, 255],
+        };
+        let row = |c: char| c.to_string().repeat(40);
+        let mut rows = vec![row('.'); 30];
+        rows.extend(["l", "d"].map(|c| row(c.chars().next().unwrap())));
+        rows.extend(vec![row('#'); 30]);
+        let rows: Vec<&str> = rows.iter().map(String::as_str).collect();
+        assert_eq!(find(&picture(40, &rows, &color), 16).inks.len(), 2);
+        // A line of a colour of its own, and a dot that is near another one but no seam.
+        let mut rows = vec![row('.'); 30];
+        rows.push(row('r'));
+        rows.extend(vec![row('.'); 30]);
+        for line in &mut rows[4..16] {
+            line.replace_range(8..20, "llllllllllll");
+        }
+        let rows: Vec<&str> = rows.iter().map(String::as_str).collect();
+        assert_eq!(find(&picture(40, &rows, &color), 16).inks.len(), 3);
     }
 
     #[test]
