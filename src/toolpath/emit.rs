@@ -2,7 +2,7 @@
 
 use super::Site;
 use super::arcs::{Arc, Fitter};
-use super::hop::hop;
+use super::hop::{Ground, hop};
 use super::order::{Direction, in_order};
 use super::ramp::ramp_onto;
 use super::trace::{DROP_MM, LEAST_ROUNDING_MM};
@@ -31,9 +31,7 @@ pub(super) fn on_program_grid(p: DVec3) -> DVec3 {
 pub(super) struct Emitter<'a> {
     job: &'a Job,
     operation: &'a Operation,
-    /// The cutter slimmed by the error budget over the ground, inflated by the allowance.
-    slim: Dropper<'a>,
-    leave_mm: f64,
+    ground: Ground<'a>,
     moves: Vec<Move>,
     arcs: Vec<Arc>,
     /// Chains left out because they have no room to ramp.
@@ -57,8 +55,7 @@ impl<'a> Emitter<'a> {
         Self {
             job,
             operation,
-            slim,
-            leave_mm,
+            ground: Ground { slim, leave_mm },
             moves,
             arcs,
             skipped: 0,
@@ -183,7 +180,7 @@ impl<'a> Emitter<'a> {
         let lifted = from.with_z(above.z);
         let entry = Move { from: low, to, kind: self.kind_in_air(to - low), line: 0 };
         let lift = [rapid(from, lifted), rapid(lifted, above), rapid(above, low), entry];
-        let over = (profile, &self.slim);
+        let over = (profile, &self.ground);
         if let Some(way) = hop(job, self.operation, travel, over, (from, to), &lift) {
             let way = way.into_iter().map(on_program_grid).chain([to]);
             return way.fold(from, |at, p| self.feed(at, p));
@@ -205,10 +202,8 @@ impl<'a> Emitter<'a> {
     pub(super) fn cut(&mut self, first: usize, profile: &Profile, block: &mut Block) {
         let passes = self.moves.split_off(first);
         let stock = self.job.stock.bounds();
-        let free = |p: DVec3| {
-            let q = p.truncate();
-            stock.contains(q) && self.slim.clears(q, p.z + DROP_MM - self.leave_mm)
-        };
+        let ground = &self.ground;
+        let free = |p: DVec3| stock.contains(p.truncate()) && ground.is_free(p);
         let fitter = Fitter::new(self.operation, self.job);
         let first_arc = self.arcs.len();
         fitter.fit(&passes, free, &mut self.moves, &mut self.arcs);

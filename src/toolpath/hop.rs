@@ -11,8 +11,8 @@
 
 use super::emit::feed_in_air;
 use super::fit::fit;
-use super::trace::Sample;
-use super::travel::{Travel, ramp_gap_mm};
+use super::trace::{DROP_MM, Sample};
+use super::travel::{GAP_MM, Travel, ramp_gap_mm};
 use crate::cutter::Profile;
 use crate::geom::{DVec2, DVec3, Move, MoveKind};
 use crate::job::{Job, Operation};
@@ -28,14 +28,34 @@ const DROPS_PER_NODE: f64 = 4.0;
 /// No clamp stands on a strip of untouched stock that is this narrow, between two cuts, mm.
 const STRIP_MM: f64 = 5.0;
 
+/// What an operation has to keep off.
+pub(super) struct Ground<'a> {
+    /// The operation's cutter, slimmed by the error budget, over the ground, inflated by the allowance.
+    pub(super) slim: Dropper<'a>,
+    /// The allowance, mm.
+    pub(super) leave_mm: f64,
+}
+
+impl Ground<'_> {
+    /// The lowest height of the tip, mm.
+    fn floor_mm(&self, p: DVec2) -> f64 {
+        self.slim.drop(p) + self.leave_mm
+    }
+
+    /// True where the tip may be.
+    pub(super) fn is_free(&self, p: DVec3) -> bool {
+        self.slim.clears(p.truncate(), p.z + DROP_MM - self.leave_mm)
+    }
+}
+
 /// The way of the tip from `from`, where the cutter stands, to `to`, both left out, as feed moves go it: a gap over the wood
-/// as it is and over what the operation has to keep off (`ground`). `None` where lifting (`lift`: the moves of that way) is
-/// quicker, or where ground has not been carved on which a clamp may stand.
+/// as it is, and clear of the ground. `None` where lifting (`lift`: the moves of that way) is quicker, or where ground has not
+/// been carved on which a clamp may stand.
 pub(super) fn hop(
     job: &Job,
     operation: &Operation,
     travel: &Travel,
-    (profile, ground): (&Profile, &Dropper),
+    (profile, ground): (&Profile, &Ground),
     (from, to): (DVec3, DVec3),
     lift: &[Move],
 ) -> Option<Vec<DVec3>> {
@@ -58,21 +78,32 @@ pub(super) fn hop(
         return None;
     }
     let mut heights = heights(travel, profile, a, b)?;
-    if !is_carved {
+    // Wood that has been carved stands no lower than the target; but between nodes it may be lower than the allowance.
+    if !is_carved || ground.leave_mm > 0.0 {
+        let gap_mm = if is_carved { GAP_MM } else { GROUND_GAP_MM };
         let length = a.distance(b);
         for (s, z) in &mut heights {
-            *z = z.max(ground.drop(a.lerp(b, *s / length)) + GROUND_GAP_MM);
+            *z = z.max(ground.floor_mm(a.lerp(b, *s / length)) + gap_mm);
         }
     }
     let way = taut(from, to, &heights);
     let lowest_mm = way.iter().map(|p| p.z).fold(from.z.min(to.z), f64::min);
     let points: Vec<DVec3> = [from].into_iter().chain(way.iter().copied()).chain([to]).collect();
-    (motion::seconds(&feeds(&points), machine) < lift_s && travel.shank_passes(a, b, lowest_mm))
-        .then_some(way)
+    let is_free = |leg: &[DVec3]| {
+        let looks = (leg[0].distance(leg[1]) / LOOK_MM).ceil() as usize;
+        (1..looks).all(|k| ground.is_free(leg[0].lerp(leg[1], k as f64 / looks as f64)))
+    };
+    (motion::seconds(&feeds(&points), machine) < lift_s
+        && travel.shank_passes(a, b, lowest_mm)
+        && points.windows(2).all(is_free))
+    .then_some(way)
 }
 
-/// Gap over what an operation has to keep off, mm.
+/// Gap over ground that has not been carved, mm.
 const GROUND_GAP_MM: f64 = 0.1;
+
+/// Distance of the places at which a hop is looked at, mm.
+const LOOK_MM: f64 = 0.05;
 
 /// Distance from `a` and height of the tip, a gap over where the cutter touches the wood, for places on the way to `b`.
 fn heights(travel: &Travel, profile: &Profile, a: DVec2, b: DVec2) -> Option<Vec<(f64, f64)>> {
@@ -198,7 +229,8 @@ mod tests {
             let ground = Heightfield::from_fn(grid, |p| {
                 if (30.0..=31.0).contains(&p.x) { clamp_mm } else { -6.0 }
             });
-            let ground = Dropper::new(&ground, profile.clone());
+            let slim = Dropper::new(&ground, profile.clone());
+            let ground = Ground { slim, leave_mm: 0.0 };
             let lift = lift(from, to, high_mm);
             let way = hop(&job, operation, &travel, (&profile, &ground), (from, to), &lift)?;
             let way: Vec<DVec3> = [from].into_iter().chain(way).chain([to]).collect();

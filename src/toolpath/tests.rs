@@ -345,7 +345,9 @@ fn assert_entries_are_ramped(path: &Toolpath, job: &Job, wood: &mut Heightfield)
             entering = true;
             assert!(!gouges(wood, &profile, m.to, 0.0), "rapid into wood at {}", m.to);
         } else if m.from.truncate() == m.to.truncate() && m.to.z < m.from.z {
-            assert!(entering && !gouges(wood, &profile, m.to, 0.0), "straight down at {}", m.to);
+            // After a rapid, or at the end of a hop.
+            assert!(!gouges(wood, &profile, m.to, 0.0), "straight down at {}", m.to);
+            entering = true;
         } else if entering {
             let down = m.from.z - m.to.z;
             let run = m.to.truncate().distance(m.from.truncate());
@@ -573,11 +575,9 @@ fn roughing_clears_a_level_ground_down_to_the_allowance() {
         let cusp = if shape == CutterShape::Ball { 0.527 } else { 0.0 };
         assert!((low + 3.5).abs() < 0.0011, "{shape:?}: {low}");
         assert!(f64::from(high) < -3.5 + cusp + 0.0011, "{shape:?}: {high}");
-        // Three levels of 1.17 mm, each one chain, and hops between them.
-        assert_eq!(
-            path.moves.windows(2).filter(|w| w[0].is_rapid() && !w[1].is_rapid()).count(),
-            1
-        );
+        // Three levels of 1.17 mm, each one chain; between them lifts, or hops where those are quicker.
+        let entries = path.moves.windows(2).filter(|w| w[0].is_rapid() && !w[1].is_rapid());
+        assert!((1..=3).contains(&entries.count()));
     }
 }
 
