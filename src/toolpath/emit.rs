@@ -168,8 +168,7 @@ impl<'a> Emitter<'a> {
         let job = self.job;
         let Some(from) = self.at() else {
             let above = to.with_z(job.safe_z_mm);
-            let low = above.with_z((touch_mm + job.clearance_mm).min(above.z));
-            let low = on_program_grid(low);
+            let low = on_program_grid(above.with_z((touch_mm + job.clearance_mm).min(above.z)));
             self.rapid(above, low);
             return low;
         };

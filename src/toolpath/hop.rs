@@ -28,6 +28,12 @@ const DROPS_PER_NODE: f64 = 4.0;
 /// No clamp stands on a strip of untouched stock that is this narrow, between two cuts, mm.
 const STRIP_MM: f64 = 5.0;
 
+/// Gap over ground that has not been carved, mm.
+const GROUND_GAP_MM: f64 = 0.1;
+
+/// Distance of the places at which a hop is looked at, mm.
+const LOOK_MM: f64 = 0.05;
+
 /// What an operation has to keep off.
 pub(super) struct Ground<'a> {
     /// The operation's cutter, slimmed by the error budget, over the ground, inflated by the allowance.
@@ -81,9 +87,9 @@ pub(super) fn hop(
     // Wood that has been carved stands no lower than the target; but between nodes it may be lower than the allowance.
     if !is_carved || ground.leave_mm > 0.0 {
         let gap_mm = if is_carved { GAP_MM } else { GROUND_GAP_MM };
-        let length = a.distance(b);
+        let along = (b - a).normalize_or_zero();
         for (s, z) in &mut heights {
-            *z = z.max(ground.floor_mm(a.lerp(b, *s / length)) + gap_mm);
+            *z = z.max(ground.floor_mm(a + along * *s) + gap_mm);
         }
     }
     let way = taut(from, to, &heights);
@@ -98,12 +104,6 @@ pub(super) fn hop(
         && points.windows(2).all(is_free))
     .then_some(way)
 }
-
-/// Gap over ground that has not been carved, mm.
-const GROUND_GAP_MM: f64 = 0.1;
-
-/// Distance of the places at which a hop is looked at, mm.
-const LOOK_MM: f64 = 0.05;
 
 /// Distance from `a` and height of the tip, a gap over where the cutter touches the wood, for places on the way to `b`.
 fn heights(travel: &Travel, profile: &Profile, a: DVec2, b: DVec2) -> Option<Vec<(f64, f64)>> {
