@@ -1,6 +1,7 @@
 //! Roughing in rings or in rows, or in whichever is quicker.
 
 use super::emit::Emitter;
+use super::needed::MOST_NODES;
 use super::pocket::{Pockets, pockets};
 use super::rough::{Rough, rough};
 use super::{Site, ToolpathError};
@@ -13,8 +14,6 @@ const SHORTEST_SPAN_PER_DIAMETER: f64 = 0.3;
 /// Rows leave steps along walls, which finishing then has to take: they are worth it when they take no more than this part
 /// of the time of rings.
 const ROWS_PER_RINGS: f64 = 0.8;
-/// Where the wood has more nodes, only rings are planned: two states of it would need too much memory.
-const MOST_NODES: usize = 60_000_000;
 
 /// The numbers of roughing.
 #[derive(Clone, Copy)]
@@ -39,6 +38,7 @@ impl Clearing {
             Pattern::Contour { milling } => self.rings(site, milling, block, out),
             Pattern::Raster { angle_rad } => self.rows(site, angle_rad, block, out),
             Pattern::Quicker { milling, angle_rad } => {
+                // Only rings, where there is no room for two states of the wood.
                 if block.field().grid().len() > MOST_NODES {
                     return self.rings(site, milling, block, out);
                 }

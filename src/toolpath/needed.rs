@@ -13,12 +13,10 @@ use rayon::prelude::*;
 const ROOM_MM: f64 = 0.5;
 /// Way that the leads and the entry of one more part take, in diameters.
 const LEADS_PER_DIAMETER: f64 = 2.0;
-
 /// Way that is cut before the rest is held against what it leaves, in diameters.
 const PIECE_PER_DIAMETER: f64 = 2.0;
-/// Where the wood has more nodes, ways are judged by the wood as it is when they begin: two states of it would need too much
-/// memory.
-const MOST_NODES: usize = 60_000_000;
+/// Two states of wood with more nodes would need too much memory.
+pub(super) const MOST_NODES: usize = 60_000_000;
 
 /// Judges ways one after the other, each cut as far as it was found to be needed.
 pub(super) struct Needed<'a> {
@@ -27,7 +25,8 @@ pub(super) struct Needed<'a> {
     /// The cutter slimmed by the limit.
     slim: Profile,
     limit_mm: f64,
-    /// The wood as what was needed so far leaves it.
+    /// The wood as what was needed so far leaves it; `None` where there is no room for it: then each way is judged by the wood as
+    /// it is when the way begins.
     wood: Option<Block>,
 }
 
