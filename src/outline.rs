@@ -129,7 +129,7 @@ pub enum OutlineError {
     },
     /// So many steps of smoothing that a shape gets more vertices than it may have.
     #[error(
-        "{shape}: smooth_outline.levels = {levels} gives it more than {limit} vertices; lower it, or leave it out to have \
+        "{shape}: levels = {levels} of its smoothing gives it more than {limit} vertices; lower it, or leave it out to have \
          as many as chord_mm asks for"
     )]
     TooManyLevels {
@@ -142,7 +142,7 @@ pub enum OutlineError {
     },
     /// A place that should name a vertex, and none is near.
     #[error(
-        "layer '{layer}': smooth_outline.{key} names a vertex at {place}, but the nearest one that was drawn lies at \
+        "layer '{layer}': {key} names a vertex at {place}, but the nearest one that was drawn lies at \
          {nearest} mm, farther away than {reach_mm} mm; correct the place (work coordinates)"
     )]
     NoVertex {

@@ -8,6 +8,7 @@ use super::error::JobError;
 use super::keys::{CREST, CREST_ENDS};
 use super::reader::{Table, as_number};
 use super::selector::read_selector;
+use super::smooth::read_smooth;
 use super::surface::{CourseSpec, CrestEnds, DrawnCrestSpec};
 
 /// Keys that only a crest by points, or only one along paths, makes use of.
@@ -32,12 +33,18 @@ fn read_crest(table: &Table<'_>) -> Result<DrawnCrestSpec, JobError> {
                 return Err(table.impossible(name, &message, "without effect", help));
             }
             let select = read_selector(table, text_or_form(table, "select")?)?;
-            CourseSpec::Paths { select, heights: heights(table)? }
+            let smooth = read_smooth(table, "smooth")?;
+            CourseSpec::Paths { select, heights: heights(table)?, smooth }
         }
         (false, true) => {
-            if let Some(name) = ["height_mm", "heights"].into_iter().find(|name| given(name)) {
+            if let Some(name) =
+                ["height_mm", "heights", "smooth"].into_iter().find(|name| given(name))
+            {
                 let message = format!("{name} belongs to a crest along paths");
-                let help = "each point has its height: [x, y, height]";
+                let help = match name {
+                    "smooth" => "a crest by points is a smooth curve anyway; leave the key out",
+                    _ => "each point has its height: [x, y, height]",
+                };
                 return Err(table.impossible(name, &message, "without effect", help));
             }
             by_points(table)?

@@ -761,6 +761,14 @@ pub(super) static CREST: Section = Section {
             Rule("0.12 of the way to the outline"),
             "half the width of the strip that is level across the crest",
         ),
+        key(
+            "smooth",
+            Kind::Forms(
+                "as smooth_outline of a layer: \"none\", \"incenter\", \"four-point\", ... or a table",
+            ),
+            Text("none"),
+            "paths only: how their straight sides are rounded to a curve; corners stay, and are kinks of the crest",
+        ),
         key("sharp", Kind::Flag, Flag(false), "a sharp edge in place of the strip"),
         key(
             "ends",

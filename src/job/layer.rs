@@ -199,7 +199,7 @@ fn layer(table: &Table<'_>, select: Selector, name: String) -> Result<LayerDraft
         feather_mm: table.sure_number("feather_mm"),
         draft_rad: table.sure_number("draft_deg").to_radians(),
         slope_cap: read_slope_cap(table)?,
-        smooth: read_smooth(table)?,
+        smooth: read_smooth(table, "smooth_outline")?,
         union: table.flag("union"),
         visible: table.flag("visible"),
         edits,

@@ -43,15 +43,15 @@ pub enum DrawnCurves {
 /// The word for no smoothing.
 const NONE: &str = "none";
 
-/// Reads `smooth_outline` of a layer.
-pub(super) fn read_smooth(layer: &Table<'_>) -> Result<Option<SmoothSpec>, JobError> {
+/// Reads `smooth_outline` of a layer, or the same of a crest.
+pub(super) fn read_smooth(layer: &Table<'_>, key: &str) -> Result<Option<SmoothSpec>, JobError> {
     let plain = |method: &str| {
         let (source, nothing) = (Source::default(), DeTable::new());
         smooth_of(&Table::unchecked(&source, &SMOOTH, &nothing), method).map(Some)
     };
-    let Some(value) = layer.raw("smooth_outline") else { return Ok(None) };
+    let Some(value) = layer.raw(key) else { return Ok(None) };
     let DeValue::Table(values) = value.get_ref() else {
-        let method = text_or_form(layer, "smooth_outline")?;
+        let method = text_or_form(layer, key)?;
         if method == NONE {
             return Ok(None);
         }
@@ -64,7 +64,7 @@ pub(super) fn read_smooth(layer: &Table<'_>) -> Result<Option<SmoothSpec>, JobEr
     {
         check_method(layer, word, method.span())?;
     }
-    let table = layer.table("smooth_outline", &SMOOTH).expect("the table is given")?;
+    let table = layer.table(key, &SMOOTH).expect("the table is given")?;
     let method = text_or_form(&table, "method")?;
     let foreign = |name: &str| !uses(method, name) && table.raw(name).is_some();
     if let Some(key) = SMOOTH.keys.iter().find(|key| foreign(key.name)) {

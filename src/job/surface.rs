@@ -1,6 +1,7 @@
 //! The types of a layer's surface: its method, and how skeletons, control meshes and cross-sections are made.
 
 use super::mesh::MeshSpec;
+use super::smooth::SmoothSpec;
 use super::types::Selector;
 
 /// How a layer's surface is made from its outline.
@@ -156,6 +157,8 @@ pub enum CourseSpec {
         select: Selector,
         /// (part of the way, height in mm), parts rising; one for all; empty: the layer's `height_mm`.
         heights: Vec<[f64; 2]>,
+        /// How their straight sides are rounded to curves; `None`: not at all.
+        smooth: Option<SmoothSpec>,
     },
     /// Through points, or by control points.
     Points {

@@ -479,11 +479,13 @@ fn crest_lines(crest: &DrawnCrestSpec) -> Vec<Line> {
         format!("[{}]", rows.collect::<Vec<_>>().join(", "))
     };
     let mut lines = match &crest.course {
-        CourseSpec::Paths { select, heights } => {
+        CourseSpec::Paths { select, heights, smooth } => {
             let mut lines = vec![("select", quoted(&select.to_string()))];
             if !heights.is_empty() {
                 lines.push(("heights", rows(&mut heights.iter().map(|h| list(h)))));
             }
+            let smooth = smooth.as_ref().map_or(quoted("none"), |s| inline(&smooth_lines(s)));
+            lines.push(("smooth", smooth));
             lines
         }
         CourseSpec::Points { points, weights, knots, closed, through } => {

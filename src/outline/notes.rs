@@ -65,6 +65,7 @@ impl NewCrossings {
 /// The notes on what smoothing did to the shapes of one layer.
 pub(super) fn of_smoothing<'a>(
     layer: &str,
+    key: &str,
     spec: &SmoothSpec,
     shapes: impl Iterator<Item = (String, &'a Smoothed, Option<&'a NewCrossings>)>,
 ) -> Vec<String> {
@@ -88,7 +89,7 @@ pub(super) fn of_smoothing<'a>(
         let shapes =
             if crossed.len() == 1 { "shape crosses itself" } else { "shapes cross themselves" };
         out.push(format!(
-            "layer '{layer}': {} {shapes} where smooth_outline made loops, and what they hold was resolved by its own fill \
+            "layer '{layer}': {} {shapes} where {key} made loops, and what they hold was resolved by its own fill \
              rule: {}; name a corner there (corners), lower corner_deg, or take chaikin or cubic-bspline, which do not \
              overshoot",
             crossed.len(),
@@ -108,7 +109,7 @@ pub(super) fn of_smoothing<'a>(
             let are = if curves == 1 { "drawn curve is kept" } else { "drawn curves are kept" };
             why.push(format!("{curves} {are} (curves = \"points\" smooths through their ends)"));
         }
-        out.push(format!("layer '{layer}': smooth_outline changes nothing: {}", why.join("; ")));
+        out.push(format!("layer '{layer}': {key} changes nothing: {}", why.join("; ")));
     }
     out
 }

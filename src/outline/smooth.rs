@@ -104,8 +104,10 @@ impl TooMany {
 /// A shape's curve, smoothed.
 #[derive(Debug, Default)]
 pub(super) struct Smoothed {
-    /// Its rings, open where it was not closed.
+    /// Its rings, the first point not repeated, and lines.
     pub(super) rings: Vec<Vec<DVec2>>,
+    /// Which of them are closed.
+    pub(super) courses: Vec<Course>,
     /// Vertices between the ends of the pieces that were smoothed.
     pub(super) rounded: usize,
     /// Vertices that stay because of their angle, because the job says so, or because borders meet there.
@@ -115,23 +117,23 @@ pub(super) struct Smoothed {
 }
 
 impl<'a> Smoother<'a> {
-    /// For the shapes of a layer.
+    /// For the curves that `keys` (the names of the lists of corners and of weights) of a layer speak of.
     ///
     /// # Errors
     /// [`OutlineError::NoVertex`] for a place of the job's with no vertex of theirs near it.
     pub(super) fn new(
-        layer: &str,
+        (layer, keys): (&str, [&'static str; 2]),
         spec: &'a SmoothSpec,
         junctions: &'a Junctions,
-        shapes: &[&Shape],
+        curves: &[&BezPath],
         tolerance_mm: f64,
         limit: usize,
     ) -> Result<Self, OutlineError> {
         let named = !spec.corners.is_empty() || !spec.weights.is_empty();
-        let vertices: Vec<DVec2> = shapes
+        let vertices: Vec<DVec2> = curves
             .iter()
             .filter(|_| named)
-            .flat_map(|shape| contour::contours(&shape.curve))
+            .flat_map(|curve| contour::strokes(curve))
             .flat_map(|contour| contour.vertices)
             .collect();
         let nearest = |key: &'static str, place: DVec2| {
@@ -145,9 +147,9 @@ impl<'a> Smoother<'a> {
             let layer = layer.to_owned();
             Err(OutlineError::NoVertex { layer, key, place, nearest: vertex, reach_mm: REACH_MM })
         };
-        let corners = spec.corners.iter().map(|&place| nearest("corners", place));
+        let corners = spec.corners.iter().map(|&place| nearest(keys[0], place));
         let weights = spec.weights.iter().map(|&[x, y, weight]| {
-            nearest("weights", DVec2::new(x, y)).map(|vertex| (vertex, weight))
+            nearest(keys[1], DVec2::new(x, y)).map(|vertex| (vertex, weight))
         });
         Ok(Self {
             spec,
@@ -164,9 +166,22 @@ impl<'a> Smoother<'a> {
     /// # Errors
     /// [`TooMany`] vertices.
     pub(super) fn smooth(&self, curve: &BezPath) -> Result<Smoothed, TooMany> {
+        self.smoothed(contour::contours(curve))
+    }
+
+    /// The lines of a curve that is not filled.
+    ///
+    /// # Errors
+    /// [`TooMany`] vertices.
+    pub(super) fn smooth_line(&self, curve: &BezPath) -> Result<Smoothed, TooMany> {
+        self.smoothed(contour::strokes(curve))
+    }
+
+    fn smoothed(&self, contours: Vec<Contour>) -> Result<Smoothed, TooMany> {
         let mut out = Smoothed::default();
         let mut count = 0;
-        for contour in contour::contours(curve) {
+        for contour in contours {
+            let course = contour.course;
             let contour = match self.spec.curves {
                 DrawnCurves::Keep => contour,
                 DrawnCurves::Points => contour.sampled(),
@@ -177,11 +192,12 @@ impl<'a> Smoother<'a> {
             }
             let mut ring = self.ring(&contour, &mut out);
             ring.dedup();
-            while ring.len() > 1 && ring.first() == ring.last() {
+            while course == Course::Closed && ring.len() > 1 && ring.first() == ring.last() {
                 ring.pop();
             }
-            if ring.len() > 2 {
+            if ring.len() > if course == Course::Closed { 2 } else { 1 } {
                 out.rings.push(ring);
+                out.courses.push(course);
             }
         }
         Ok(out)
@@ -200,7 +216,7 @@ impl<'a> Smoother<'a> {
         out.corners += corners.iter().filter(|corner| **corner).count();
         out.curves += (0..n).filter(|i| contour.is_curve(*i)).count();
         let mut ring = Vec::new();
-        for (indices, course) in pieces(n, Course::Closed, |i| corners[i] || by_curve(i)) {
+        for (indices, course) in pieces(n, contour.course, |i| corners[i] || by_curve(i)) {
             let (first, last) = (indices[0], indices[indices.len() - 1]);
             if contour.is_curve(first) {
                 contour.push_chords(first, self.tolerance_mm, &mut ring);
@@ -231,6 +247,9 @@ impl<'a> Smoother<'a> {
             // The next piece begins with the point that this one ends with.
             let shared = usize::from(course == Course::Open);
             ring.extend(&fine[..fine.len() - shared]);
+        }
+        if contour.course == Course::Open {
+            ring.extend(contour.vertices.last());
         }
         ring
     }

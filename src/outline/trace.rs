@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use kurbo::BezPath;
 use rayon::prelude::*;
 
 use super::notes::{self, Change, Gone, NewCrossings};
@@ -10,6 +11,7 @@ use super::smooth::{Junctions, Smoothed, Smoother};
 use super::{Figure, OutlineError, OutlineLayer, Outlines, RidgePath};
 use crate::artwork::boolean::{self, FixedGrid, NodeRing};
 use crate::artwork::{FillRule, Part, Placed, Shape, curve};
+use crate::geom::curves::Course;
 use crate::geom::edge_grid::EdgeGrid;
 use crate::geom::{Bounds, DVec2, Tolerance, bounds_of};
 use crate::job::{CourseSpec, LayerSpec, SurfaceSpec};
@@ -52,9 +54,11 @@ pub fn trace(
             continue;
         }
         let (mut traced, notes) = tracer.layer(index, layer, indices)?;
-        traced.ridges = ridges(placed, layer, chord_mm)?;
+        let (ridges, more) = ridges(placed, layer, chord_mm)?;
+        traced.ridges = ridges;
         out.layers.push(traced);
         out.notes.extend(notes);
+        out.notes.extend(more);
     }
     debug_assert!(
         out.layers
@@ -68,28 +72,56 @@ pub fn trace(
 }
 
 /// The paths that the crests of a layer run along: open ones, the middles of strokes, and the outlines of fills where
-/// nothing else has the name.
+/// nothing else has the name; and notes on their smoothing.
 fn ridges(
     placed: &Placed,
     layer: &LayerSpec,
     chord_mm: f64,
-) -> Result<Vec<RidgePath>, OutlineError> {
+) -> Result<(Vec<RidgePath>, Vec<String>), OutlineError> {
     const LISTED: usize = 12;
-    let SurfaceSpec::Drawn(drawn) = &layer.surface else { return Ok(Vec::new()) };
-    let mut ridges = Vec::new();
+    let tolerance_mm = chord_mm * FLATTEN_PER_CHORD;
+    let SurfaceSpec::Drawn(drawn) = &layer.surface else { return Ok((Vec::new(), Vec::new())) };
+    let (mut ridges, mut notes) = (Vec::new(), Vec::new());
+    let junctions = Junctions::default();
     for (crest, spec) in drawn.crests.iter().enumerate() {
-        let CourseSpec::Paths { select, .. } = &spec.course else { continue };
+        let CourseSpec::Paths { select, smooth, .. } = &spec.course else { continue };
         let mut named: Vec<&Shape> =
             placed.shapes.iter().filter(|s| s.is_named_by(select)).collect();
         if named.iter().any(|s| s.part != Part::Fill) {
             named.retain(|s| s.part != Part::Fill);
         }
         let known = ridges.len();
-        for shape in named {
-            let line = shape.course.as_ref().unwrap_or(&shape.curve);
-            for (points, closed) in curve::lines(line, chord_mm * FLATTEN_PER_CHORD) {
+        let line = |shape: &&'_ Shape| shape.course.as_ref().unwrap_or(&shape.curve).clone();
+        let curves: Vec<BezPath> = named.iter().map(line).collect();
+        let smoother = |spec| {
+            let keys = ["smooth.corners of a crest", "smooth.weights of a crest"];
+            let curves: Vec<&BezPath> = curves.iter().collect();
+            let layer = (layer.name.as_str(), keys);
+            Smoother::new(layer, spec, &junctions, &curves, tolerance_mm, MAX_CHORDS)
+        };
+        let smoother = smooth.as_ref().map(smoother).transpose()?;
+        let mut changes = Vec::new();
+        for (shape, line) in named.iter().zip(&curves) {
+            let lines = match &smoother {
+                None => curve::lines(line, tolerance_mm),
+                Some(smoother) => {
+                    let mut smoothed = smoother.smooth_line(line).map_err(|many| many.of(shape))?;
+                    let rings = std::mem::take(&mut smoothed.rings).into_iter();
+                    let lines =
+                        rings.zip(&smoothed.courses).map(|(p, c)| (p, *c == Course::Closed));
+                    let lines = lines.collect();
+                    changes.push((name(shape), smoothed));
+                    lines
+                }
+            };
+            for (points, closed) in lines {
                 ridges.push(RidgePath { crest, source: shape.source.clone(), points, closed });
             }
+        }
+        if let Some(spec) = smooth {
+            let what = format!("smooth of crest {}", crest + 1);
+            let changes = changes.iter().map(|(name, change)| (name.clone(), change, None));
+            notes.extend(notes::of_smoothing(&layer.name, &what, spec, changes));
         }
         if ridges.len() == known {
             let lines = placed.shapes.iter().filter(|s| s.part != Part::Fill);
@@ -111,7 +143,7 @@ fn ridges(
             return Err(OutlineError::NoCrestPath { layer, crest: crest + 1, select, there_is });
         }
     }
-    Ok(ridges)
+    Ok((ridges, notes))
 }
 
 /// Which version of a shape: its index, and the layer whose `smooth_outline` it has; `None` as drawn.
@@ -181,9 +213,11 @@ impl<'a> Tracer<'a> {
             .iter()
             .zip(&placed.layers)
             .map(|(layer, taken)| {
-                let own: Vec<&Shape> = taken.iter().map(|&i| &shapes[i]).collect();
+                let own: Vec<&BezPath> = taken.iter().map(|&i| &shapes[i].curve).collect();
                 let smoother = |spec| {
-                    Smoother::new(&layer.name, spec, &junctions, &own, tolerance_mm, MAX_CHORDS)
+                    let keys = ["smooth_outline.corners", "smooth_outline.weights"];
+                    let layer = (layer.name.as_str(), keys);
+                    Smoother::new(layer, spec, &junctions, &own, tolerance_mm, MAX_CHORDS)
                 };
                 layer.smooth.as_ref().map(smoother).transpose()
             })
@@ -262,7 +296,7 @@ impl<'a> Tracer<'a> {
                 let own = of(i)?;
                 Some((name(&self.shapes[i]), own.smoothed.as_ref()?, own.new_crossings.as_ref()))
             });
-            notes.extend(notes::of_smoothing(&layer.name, spec, smoothed));
+            notes.extend(notes::of_smoothing(&layer.name, "smooth_outline", spec, smoothed));
         }
         let figures: Vec<Figure> = figures.into_iter().filter(|f| !f.regions.is_empty()).collect();
         if figures.is_empty() {

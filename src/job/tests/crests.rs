@@ -1,6 +1,7 @@
 //! `[[layer.crest]]`: what is read, what is written back, what is refused and where.
 
 use super::*;
+use crate::geom::curves;
 
 /// A layer of drawn crests; its lines start in line 3 of the file.
 fn layer(crests: &str) -> String {
@@ -25,6 +26,7 @@ fn crests_are_read_and_written() {
     let paths = |select: Selector, heights: &[[f64; 2]]| CourseSpec::Paths {
         select,
         heights: heights.to_vec(),
+        smooth: None,
     };
     let want = [
         (paths(Selector::Label("midrib".into()), &[]), None, false),
@@ -38,6 +40,19 @@ fn crests_are_read_and_written() {
         ends: CrestEnds::Natural,
     });
     assert_eq!(drawn.crests, want);
+
+    let drawn = read(
+        "[[layer.crest]]\nselect = \"id:vein\"\nsmooth = \"incenter\"\n[[layer.crest]]\nselect = \"id:vein\"\n\
+         smooth = { method = \"four-point\", tension = 0.05, corner_deg = 60 }\n",
+    );
+    let smooth = |k: usize| match &drawn.crests[k].course {
+        CourseSpec::Paths { smooth: Some(smooth), .. } => smooth.clone(),
+        _ => panic!("smoothed paths"),
+    };
+    assert_eq!(smooth(0).scheme, curves::Scheme::Incenter { update: 0.25 });
+    let ends = curves::EndRule::Reflect;
+    assert_eq!(smooth(1).scheme, curves::Scheme::FourPoint { tension: 0.05, ends });
+    assert!((smooth(1).corner_rad.to_degrees() - 60.0).abs() < 1e-12);
 
     let drawn = read("[[layer.crest]]\npoints = [[1, 2, 3], [40, 8.5, 6]]\n");
     let [ref crest] = drawn.crests[..] else { panic!("one crest") };
@@ -83,6 +98,11 @@ fn crests_that_do_not_go_together_are_refused_at_their_place() {
             "has 1 numbers, these points need 2",
         ),
         ("points = [[0, 0, 1], [1, 0, 1]]\nknots = [1, 1]", (9, 9), "these points need 1"),
+        (
+            "points = [[0, 0, 1], [1, 0, 1]]\nsmooth = \"incenter\"",
+            (9, 10),
+            "smooth belongs to a crest along paths",
+        ),
         ("select = \"label:a\"\nsharp = true\nhalf_width_mm = 1", (10, 17), "a sharp crest"),
     ] {
         refused(&layer(&format!("[[layer.crest]]\n{lines}\n")), kind, place, &[words]);

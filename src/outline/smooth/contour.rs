@@ -3,6 +3,7 @@
 use kurbo::{BezPath, ParamCurve, PathEl, PathSeg, Point};
 
 use crate::geom::DVec2;
+use crate::geom::curves::Course;
 
 /// Consecutive vertices of straight sides closer than this part of the contour's size are one.
 const SAME: f64 = 1e-9;
@@ -14,12 +15,14 @@ const TURN_DEG: f64 = 30.0;
 /// But at most this many.
 const MOST_POINTS: f64 = 64.0;
 
-/// A closed contour as it was drawn.
+/// A contour as it was drawn.
 #[derive(Debug, Clone)]
 pub(super) struct Contour {
+    /// Whether a side leads from its last vertex to its first.
+    pub(super) course: Course,
     /// Ends of its sides.
     pub(super) vertices: Vec<DVec2>,
-    /// The side that begins at each vertex: a curve, or straight.
+    /// The side that begins at each vertex: a curve, or straight. That of the last vertex of an open one is none.
     sides: Vec<Option<PathSeg>>,
     /// For each vertex by how much it turns, where that is known better than from its neighbours, radians.
     turns: Vec<Option<f64>>,
@@ -27,14 +30,31 @@ pub(super) struct Contour {
 
 /// The contours of a path, each closed as filling closes it. Those without an area's worth of sides are left out.
 pub(super) fn contours(path: &BezPath) -> Vec<Contour> {
+    read(path, true)
+}
+
+/// The contours of a path, open where it is neither closed nor ends where it began.
+pub(super) fn strokes(path: &BezPath) -> Vec<Contour> {
+    read(path, false)
+}
+
+fn read(path: &BezPath, filled: bool) -> Vec<Contour> {
     let mut out: Vec<Contour> = Vec::new();
     let mut at = Point::ZERO;
     let mut open: Option<Contour> = None;
-    let finish = |open: &mut Option<Contour>, at: Point, out: &mut Vec<Contour>| {
+    let finish = |open: &mut Option<Contour>, at: Point, closed: bool, out: &mut Vec<Contour>| {
         if let Some(mut contour) = open.take() {
-            let start = contour.vertices.first().copied();
-            if start.is_some_and(|start| start != place(at)) {
+            let returns = contour.vertices.first().is_some_and(|start| *start == place(at));
+            if !returns {
                 contour.push(at, None);
+            }
+            // Two sides there and back are a line.
+            let ring = closed || (returns && contour.vertices.len() > 2);
+            if !ring {
+                contour.course = Course::Open;
+                if returns {
+                    contour.push(at, None);
+                }
             }
             out.extend(contour.cleaned());
         }
@@ -43,12 +63,12 @@ pub(super) fn contours(path: &BezPath) -> Vec<Contour> {
     for el in path.elements() {
         let next = match *el {
             PathEl::MoveTo(p) => {
-                finish(&mut open, at, &mut out);
+                finish(&mut open, at, filled, &mut out);
                 (start, at) = (p, p);
                 continue;
             }
             PathEl::ClosePath => {
-                finish(&mut open, at, &mut out);
+                finish(&mut open, at, true, &mut out);
                 at = start;
                 continue;
             }
@@ -58,19 +78,19 @@ pub(super) fn contours(path: &BezPath) -> Vec<Contour> {
                 (p, Some(PathSeg::Cubic(kurbo::CubicBez::new(at, a, b, p))))
             }
         };
-        let contour = open.get_or_insert_with(|| Contour {
-            vertices: Vec::new(),
-            sides: Vec::new(),
-            turns: Vec::new(),
-        });
+        let contour = open.get_or_insert_with(|| Contour::of(Course::Closed));
         contour.push(at, next.1);
         at = next.0;
     }
-    finish(&mut open, at, &mut out);
+    finish(&mut open, at, filled, &mut out);
     out
 }
 
 impl Contour {
+    fn of(course: Course) -> Self {
+        Self { course, vertices: Vec::new(), sides: Vec::new(), turns: Vec::new() }
+    }
+
     /// True when the side that begins at vertex `index` is a drawn curve.
     pub(super) fn is_curve(&self, index: usize) -> bool {
         self.sides[index].is_some()
@@ -82,6 +102,9 @@ impl Contour {
             return turn;
         }
         let n = self.vertices.len();
+        if self.course == Course::Open && (index == 0 || index + 1 == n) {
+            return 0.0;
+        }
         let before = (index + n - 1) % n;
         let arriving =
             self.end_tangent(before).unwrap_or(self.vertices[index] - self.vertices[before]);
@@ -120,7 +143,7 @@ impl Contour {
 
     /// The same contour with curves as straight sides between points on them. Where it turned it turns as much as before.
     pub(super) fn sampled(&self) -> Self {
-        let mut out = Self { vertices: Vec::new(), sides: Vec::new(), turns: Vec::new() };
+        let mut out = Self::of(self.course);
         for (i, side) in self.sides.iter().enumerate() {
             out.vertices.push(self.vertices[i]);
             out.turns.push(Some(self.turn_at(i)));
@@ -142,13 +165,14 @@ impl Contour {
         self.turns.push(None);
     }
 
-    /// Without straight sides of no length; `None` when no area is left.
+    /// Without straight sides of no length; `None` when no area is left, or of an open one no length.
     fn cleaned(self) -> Option<Self> {
         let near = SAME * crate::geom::bounds_of(&self.vertices).size().length();
         let n = self.vertices.len();
         let end = |i: usize| self.vertices[(i + 1) % n];
         let keep: Vec<bool> = (0..n)
             .map(|i| match &self.sides[i] {
+                None if self.course == Course::Open && i + 1 == n => true,
                 Some(side) => control_points(side).iter().any(|p| *p != self.vertices[i]),
                 None => self.vertices[i].distance(end(i)) > near,
             })
@@ -156,9 +180,10 @@ impl Contour {
         let kept = |i: &usize| keep[*i];
         let vertices: Vec<DVec2> = (0..n).filter(kept).map(|i| self.vertices[i]).collect();
         let sides: Vec<Option<PathSeg>> = (0..n).filter(kept).map(|i| self.sides[i]).collect();
-        let bounded = vertices.len() > 2 || sides.iter().any(Option::is_some);
+        let least = if self.course == Course::Open { 1 } else { 2 };
+        let bounded = vertices.len() > least || sides.iter().any(Option::is_some);
         let turns = vec![None; vertices.len()];
-        bounded.then_some(Self { vertices, sides, turns })
+        bounded.then_some(Self { course: self.course, vertices, sides, turns })
     }
 }
 

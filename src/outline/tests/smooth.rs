@@ -6,7 +6,10 @@ use super::*;
 use crate::artwork::read_bitmap;
 use crate::geom::DVec2;
 use crate::geom::curves::{EndRule, Fit, Scheme, Spacing};
-use crate::job::{ArtworkSpec, DrawnCurves, Fit as Size, Place, SmoothSpec, TraceSpec};
+use crate::job::{
+    ArtworkSpec, CourseSpec, CrestEnds, CrestSpec, DrawnCrestSpec, DrawnCurves, DrawnSpec,
+    Fit as Size, Place, SmoothSpec, SurfaceSpec, TraceSpec,
+};
 use proptest::prelude::*;
 
 const FOUR_POINT: Scheme = Scheme::FourPoint { tension: 0.0625, ends: EndRule::Reflect };
@@ -210,7 +213,7 @@ fn too_many_levels_are_refused() {
     let layers = [smoothed(&SmoothSpec { levels: Some(10), ..spec(BSPLINE) })];
     let refused = trace(&placed(&drawn, &layers), &layers, &Tolerance::default());
     let message = refused.unwrap_err().to_string();
-    assert!(message.contains("smooth_outline.levels = 10"), "{message}");
+    assert!(message.contains("levels = 10 of its smoothing"), "{message}");
 }
 
 /// Three figures around a point, next to each other, with bent borders.
@@ -340,4 +343,66 @@ proptest! {
         let (figures, _) = smooth(&body, &spec);
         prop_assert!(figures.iter().all(|f| vertices(f).iter().all(|p| p.is_finite())));
     }
+}
+
+/// A drawing's crest, smoothed, and the notes.
+fn crest_of(d: &str, smooth: SmoothSpec) -> (RidgePath, Vec<String>) {
+    let course = CourseSpec::Paths {
+        select: Selector::Id("c".into()),
+        heights: vec![],
+        smooth: Some(smooth),
+    };
+    let (sharp, half_width_mm, ends) = (false, None, CrestEnds::Natural);
+    let crests = vec![DrawnCrestSpec { course, sharp, half_width_mm, ends }];
+    let surface = SurfaceSpec::Drawn(DrawnSpec { crests, crest: CrestSpec::default() });
+    let layer = LayerSpec { surface, ..layer(Selector::Id("o".into())) };
+    let body = format!(
+        "<rect id='o' x='1' y='1' width='98' height='98'/><path id='c' fill='none' stroke='red' d='{d}'/>"
+    );
+    let mut outlines = traced(&body, &[layer]);
+    let [ref crest] = outlines.layers[0].ridges[..] else { panic!("one line") };
+    (crest.clone(), std::mem::take(&mut outlines.notes))
+}
+
+/// The incenter scheme makes circles of uneven points on one: of an open line an arc between its own ends. Drawings come in
+/// single precision.
+#[test]
+fn drawn_crests_are_smoothed_between_their_ends() {
+    let centre = DVec2::splat(50.0);
+    let on = |degrees: f64| {
+        let (sin, cos) = libm::sincos(degrees.to_radians());
+        centre + DVec2::new(cos, sin) * 30.0
+    };
+    let points = [0.0, 25.0, 40.0, 75.0, 100.0, 140.0, 160.0].map(on);
+    let line: Vec<String> = points.iter().map(|p| format!("{} {}", p.x, p.y)).collect();
+    let (crest, notes) = crest_of(&format!("M{}", line.join("L")), spec(INCENTER));
+    assert_eq!(notes, Vec::<String>::new());
+    assert!(!crest.closed && crest.points.len() > 100);
+    let radius = (points[0] - centre).length();
+    let middle = |p: &DVec2| DVec2::new(p.x, 100.0 - p.y);
+    // Work coordinates run upwards.
+    let all: Vec<DVec2> = crest.points.iter().map(middle).collect();
+    assert!(all.iter().all(|p| (p.distance(centre) - radius).abs() < 1e-4));
+    assert!(all[0].distance(points[0]) < 1e-5 && all[all.len() - 1].distance(points[6]) < 1e-5);
+    assert!(points.iter().all(|p| all.iter().any(|q| p.distance(*q) < 1e-5)));
+}
+
+/// Corners stay and part the pieces, curves stay, two points are a line, and what changes nothing is told.
+#[test]
+fn corners_curves_and_short_lines_of_crests_stay() {
+    let (crest, notes) = crest_of("M10 50L30 50L50 55L50 75L48 90", spec(Scheme::Chaikin));
+    assert_eq!(notes, Vec::<String>::new());
+    assert!(crest.points.contains(&DVec2::new(50.0, 45.0)), "the corner");
+    assert!(!crest.points.contains(&DVec2::new(30.0, 50.0)), "cut");
+    let (crest, notes) = crest_of("M10 50L90 50", spec(INCENTER));
+    assert_eq!(crest.points.first(), Some(&DVec2::new(10.0, 50.0)));
+    assert_eq!(crest.points.last(), Some(&DVec2::new(90.0, 50.0)));
+    assert!(notes[0].contains("smooth of crest 1 changes nothing"), "{notes:?}");
+    let (curve, notes) = crest_of("M10 50C30 20 60 20 90 50", spec(INCENTER));
+    assert!(notes[0].contains("1 drawn curve is kept"), "{notes:?}");
+    assert_eq!(curve.points.last(), Some(&DVec2::new(90.0, 50.0)));
+    let (ring, _) =
+        crest_of("M30 50L50 30L70 50L50 70Z", SmoothSpec { corner_rad: 3.2, ..spec(BSPLINE) });
+    assert!(ring.closed && ring.points.len() > 20);
+    assert!(!ring.points.contains(&DVec2::new(30.0, 50.0)));
 }

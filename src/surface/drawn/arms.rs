@@ -26,6 +26,10 @@ const SLACK: f64 = 1e-9;
 /// The first step of an arm out of a joint, and the distance of the last point from a free end, in edges of the mesh.
 const STEP: f64 = 0.6;
 const LAST: f64 = 0.3;
+/// Places that a curve has to go through this near to a joint are the joint, in edges.
+const BESIDE: f64 = 0.1;
+/// Largest ratio of the ways from a joint to the two points next to it.
+const GRADE: f64 = 1.5;
 /// Two arms that turn by less than this are one line, degrees.
 const STRAIGHT_DEG: f64 = 30.0;
 
@@ -299,7 +303,9 @@ fn samples(line: &Line, piece: &Piece, edge_mm: f64) -> Vec<f64> {
         passed.extend(line.passed.iter().map(|s| s + whole * turn as f64));
     }
     let tiny = 1e-6 * length;
-    passed.retain(|s| *s > piece.from + tiny && *s < piece.to - tiny);
+    // A place next to a joint is the joint.
+    let clear = piece.joints.map(|joint| if joint.is_some() { BESIDE * step } else { tiny });
+    passed.retain(|s| *s > piece.from + clear[0] && *s < piece.to - clear[1]);
     let low = 1 + usize::from(piece.joints[0].is_some());
     let high = n - usize::from(piece.joints[1].is_some());
     let even = (low..high).map(|k| piece.from + step * k as f64);
@@ -315,7 +321,26 @@ fn samples(line: &Line, piece: &Piece, edge_mm: f64) -> Vec<f64> {
     }
     out.sort_unstable_by(f64::total_cmp);
     out.dedup_by(|a, b| (*a - *b).abs() <= tiny.max(0.05 * step));
+    for end in (0..2).filter(|&end| piece.joints[end].is_some() && !line.sharp) {
+        graded(&mut out, piece, end);
+    }
     out
+}
+
+/// Adds places where the next one to a joint is so near that the way to the one after it would be much longer: knots are
+/// even there, and a curve through uneven points would overshoot.
+fn graded(samples: &mut Vec<f64>, piece: &Piece, end: usize) {
+    let mut ways: Vec<f64> =
+        samples.iter().map(|s| if end == 0 { s - piece.from } else { piece.to - s }).collect();
+    ways.sort_unstable_by(f64::total_cmp);
+    let far = ways.get(1).copied().unwrap_or(piece.to - piece.from);
+    let Some(near) = ways.first().copied().filter(|near| *near > 0.0) else { return };
+    let steps = (libm::log(far / near) / libm::log(GRADE) - SLACK).ceil();
+    let grade = libm::pow(far / near, 1.0 / steps);
+    for k in 1..steps as i32 {
+        samples.push(piece.place(end, near * libm::pow(grade, f64::from(k))));
+    }
+    samples.sort_unstable_by(f64::total_cmp);
 }
 
 /// Sorts the arms of a joint into two lines and finds their steps.
@@ -392,6 +417,13 @@ fn joint(
         if alone && order[other].is_some() && order[other + 2].is_some() {
             steps[axis].z = 0.0;
         }
+    }
+    // Two lines that stand at a slant: the ends of the one's step stay behind the vertices next to the other's.
+    let [x, y] = steps.map(DVec3::truncate);
+    if x != DVec2::ZERO && y != DVec2::ZERO {
+        let sine = x.perp_dot(y).abs() / (x.length() * y.length());
+        let shorter = sine * x.length().min(y.length());
+        steps = steps.map(|s| s * (shorter / s.truncate().length()).min(1.0));
     }
     let sharp = lines[line].sharp;
     for (slot, k) in order.iter().enumerate() {
@@ -474,10 +506,10 @@ fn arm(
     let n = spacings.len();
     // Spacings next to a joint are the same on both sides of it, and the following ones, too.
     for k in 0..2.min(n) {
-        if matches!(start, End::Joint { .. }) {
+        if matches!(start, End::Joint { .. }) && !line.sharp {
             spacings[k] = 1.0;
         }
-        if matches!(finish, End::Joint { .. }) {
+        if matches!(finish, End::Joint { .. }) && !line.sharp {
             spacings[n - 1 - k] = 1.0;
         }
     }

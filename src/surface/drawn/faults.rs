@@ -128,7 +128,8 @@ pub enum CrestFault {
     },
     /// Arms that lie too close together where they meet.
     #[error(
-        "crests meet at {at:.2} at an angle of {angle_deg:.0} degrees; let them meet at {least_deg:.0} degrees or more"
+        "crests meet or turn back at {at:.2} at an angle of {angle_deg:.0} degrees; let them meet at {least_deg:.0} degrees or \
+         more, or make them sharp"
     )]
     TooAcute {
         /// Where, mm.

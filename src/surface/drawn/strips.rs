@@ -25,6 +25,9 @@ const LEAST_CELLS: f64 = 2.0;
 /// Strips take up this part of the way to another crest, or of the radius of a bend.
 const SHARE: f64 = 0.3;
 const BEND_SHARE: f64 = 0.6;
+/// Columns whose strip folds get this part of their width, so many times at most.
+const NARROWED: f64 = 0.7;
+const NARROWER: usize = 12;
 /// Crests are round over this part of the way to the outline at most.
 const MOST_ROUND: f64 = 0.3;
 
@@ -108,6 +111,34 @@ impl Widths<'_> {
         let least = LEAST_CELLS * self.settings.cell_mm;
         let width = self.lines[line].half_width_mm;
         width.unwrap_or_else(|| (WIDTH * far).max(least) * self.part)
+    }
+
+    /// The steps from a line's control points to the left edge of its strip.
+    ///
+    /// # Errors
+    /// [`CrestFault::Bend`]: the width given is more than the radius of a bend.
+    fn asides(&self, plan: &[DVec2], closed: bool, line: usize) -> Result<Vec<DVec2>, CrestFault> {
+        let n = plan.len();
+        let Line { name, half_width_mm, .. } = &self.lines[line];
+        let mut out = Vec::with_capacity(n);
+        for k in 0..n {
+            let (before, after) = if closed {
+                (plan[(k + n - 1) % n], plan[(k + 1) % n])
+            } else {
+                (plan[k.saturating_sub(1)], plan[(k + 1).min(n - 1)])
+            };
+            let normal = (after - before).normalize_or(DVec2::X).perp();
+            let mut width = self.at(line, plan[k]);
+            let radius = radius(before, plan[k], after);
+            if half_width_mm.is_none() {
+                width = width.min(BEND_SHARE * radius);
+            } else if width > radius {
+                let crest = name.clone();
+                return Err(CrestFault::Bend { crest, at: plan[k], half_width_mm: width });
+            }
+            out.push(normal * width);
+        }
+        Ok(out)
     }
 
     /// Half the width over which a line is round at a place, in parts of the way to the outline.
@@ -295,28 +326,28 @@ impl Strips {
             last = n - 2;
             on[1] = spacings.pop().unwrap_or(1.0);
         }
-        for k in first..last.max(first) {
+        let mut asides = widths.asides(&plan, closed, arm.line)?;
+        let last = last.max(first);
+        if lines[arm.line].half_width_mm.is_none() {
+            let ahead = match arm.ends[1] {
+                End::Joint { joint, slot } => {
+                    let round = &rounds[joint];
+                    Some([round.corners[slot], round.arms[slot], round.corners[(slot + 3) % 4]])
+                }
+                _ => None,
+            };
+            let sides =
+                [columns.first().copied(), ahead].map(|c| c.map(|c| c.map(|v| self.plan(v))));
+            narrow(&plan[first..last], &mut asides[first..last], sides, closed);
+        }
+        for k in first..last {
             if let Some(end) = [0, 1].into_iter().find(|&end| {
                 arm.ends[end] == End::Landed && !closed && k == if end == 0 { 0 } else { n - 1 }
             }) {
                 columns.push(self.landed(end, k, &points, lines, arm.line, widths)?);
                 continue;
             }
-            let (before, after) = if closed {
-                (plan[(k + n - 1) % n], plan[(k + 1) % n])
-            } else {
-                (plan[k.saturating_sub(1)], plan[(k + 1).min(n - 1)])
-            };
-            let normal = (after - before).normalize_or(DVec2::X).perp();
-            let mut width = widths.at(arm.line, plan[k]);
-            let radius = radius(before, plan[k], after);
-            if lines[arm.line].half_width_mm.is_none() {
-                width = width.min(BEND_SHARE * radius);
-            } else if width > radius {
-                let crest = name.clone();
-                return Err(CrestFault::Bend { crest, at: plan[k], half_width_mm: width });
-            }
-            let aside = (normal * width).extend(0.0).extend(0.0) * points[k].w;
+            let aside = asides[k].extend(0.0).extend(0.0) * points[k].w;
             let row = [points[k] - aside, points[k], points[k] + aside];
             columns.push(row.map(|p| self.add(p, name)));
         }
@@ -397,8 +428,7 @@ impl Strips {
     fn check_upright(&self) -> Result<(), CrestFault> {
         for quad in &self.quads {
             let p = quad.map(|v| self.plan(v));
-            let bent = (0..4).find(|&k| orient(p[k], p[(k + 1) % 4], p[(k + 2) % 4]) <= 0.0);
-            if let Some(k) = bent {
+            if let Some(k) = bent(p) {
                 let crest = self.owner[quad[k] as usize].clone();
                 let half_width_mm = p[0].distance(p[3]).min(p[1].distance(p[2]));
                 return Err(CrestFault::Bend { crest, at: p[k], half_width_mm });
@@ -406,6 +436,40 @@ impl Strips {
         }
         Ok(())
     }
+}
+
+/// Makes a strip narrower where it folds; `asides` are the steps from its centre to its left edge, and the columns before
+/// and after, right to left, stay as they are.
+fn narrow(plan: &[DVec2], asides: &mut [DVec2], sides: [Option<[DVec2; 3]>; 2], closed: bool) {
+    let n = plan.len();
+    for _ in 0..NARROWER {
+        let column = |k: usize| [plan[k] - asides[k], plan[k], plan[k] + asides[k]];
+        let folds = |[r, c, l]: [DVec2; 3], [r2, c2, l2]: [DVec2; 3]| {
+            bent([r, r2, c2, c]).or(bent([c, c2, l2, l])).is_some()
+        };
+        let mut folded = vec![false; n];
+        for k in 0..n {
+            if (k + 1 < n || closed) && folds(column(k), column((k + 1) % n)) {
+                folded[k] = true;
+                folded[(k + 1) % n] = true;
+            }
+        }
+        if n > 0 {
+            folded[0] |= sides[0].is_some_and(|side| folds(side, column(0)));
+            folded[n - 1] |= sides[1].is_some_and(|side| folds(column(n - 1), side));
+        }
+        if !folded.contains(&true) {
+            return;
+        }
+        for (aside, _) in asides.iter_mut().zip(folded).filter(|(_, folded)| *folded) {
+            *aside *= NARROWED;
+        }
+    }
+}
+
+/// The first corner of a quadrilateral at which it does not run counter-clockwise.
+fn bent(p: [DVec2; 4]) -> Option<usize> {
+    (0..4).find(|&k| orient(p[k], p[(k + 1) % 4], p[(k + 2) % 4]) <= 0.0)
 }
 
 /// Radius of the circle through three points, mm.

@@ -325,6 +325,25 @@ fn closed_kinked_and_rational_crests_are_held() {
     }
 }
 
+/// A zigzag with a height on a kink, one beside a kink, and free ends.
+#[test]
+fn heights_on_and_beside_kinks_are_held() {
+    let region = ellipse(54.0, 34.0, 300);
+    let plan =
+        [[-40.0, 0.0], [-15.0, -15.0], [0.0, 10.0], [20.0, -15.0], [40.0, 2.0]].map(DVec2::from);
+    let course = drawn_path(&plan, false, &[[0.0, 2.0], [0.26, 8.0], [0.5, 8.0], [1.0, 2.0]]);
+    for sharp in [false, true] {
+        let drawn = DrawnCrest { sharp, ..crest(course.clone()) };
+        let control = control_over(&region, &[drawn], &settings()).unwrap();
+        assert!(upright(control.mesh.mesh()));
+        assert_eq!(control.crests.len(), 4);
+        let far = held(&control, 3);
+        assert!(far < 1e-11, "{sharp} {far}");
+        let top = control.crests.iter().flatten().map(|p| p.z).fold(0.0, f64::max);
+        assert!((8.0..8.1).contains(&top), "{top}");
+    }
+}
+
 /// Heights along a path: exact where they are listed, and never beyond their neighbours.
 #[test]
 fn heights_run_smoothly_between_those_listed() {
