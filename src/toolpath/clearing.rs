@@ -6,7 +6,6 @@ use super::pocket::{Pockets, pockets};
 use super::rough::{Rough, rough};
 use super::{Site, ToolpathError};
 use crate::job::{Milling, Pattern};
-use crate::motion;
 use crate::stock::Block;
 
 /// Shortest span of a roughing pass, as a fraction of the cutter's diameter.
@@ -45,9 +44,8 @@ impl Clearing {
                 let (mut other_block, mut other) = (block.clone(), Emitter::new(site));
                 self.rings(site, milling, block, out)?;
                 let rows = self.rows(site, angle_rad, &mut other_block, &mut other);
-                let seconds = |e: &Emitter| motion::seconds(e.moves(), &site.job.machine);
                 let is_complete = rows.is_ok() && other.skipped() <= out.skipped();
-                if is_complete && seconds(&other) <= ROWS_PER_RINGS * seconds(out) {
+                if is_complete && other.seconds() <= ROWS_PER_RINGS * out.seconds() {
                     (*block, *out) = (other_block, other);
                     out.choose("in rows, which take four fifths of the time of rings or less");
                 } else {
@@ -131,7 +129,7 @@ mod tests {
             let rings = moves(Pattern::Contour { milling });
             let rows = moves(Pattern::Raster { angle_rad });
             let quicker = moves(Pattern::Quicker { milling, angle_rad });
-            let seconds = |moves| motion::seconds(moves, &job.machine);
+            let seconds = |moves| crate::motion::seconds(moves, &job.machine);
             let share = seconds(&rows.0) / seconds(&rings.0);
             let in_rows = share <= 0.8;
             let like = if in_rows { rows } else { rings };

@@ -10,10 +10,12 @@ use super::travel::{CARVED_MM, Travel, ramp_gap_mm};
 use crate::cutter::Profile;
 use crate::geom::{DVec2, DVec3, Move, MoveKind};
 use crate::job::{Job, Machine, Operation, OperationKind};
+use crate::motion;
 use crate::offset::Dropper;
 use crate::stock::{Block, Contact};
 use rayon::prelude::*;
 use std::collections::VecDeque;
+use std::sync::Arc as Shared;
 
 /// A feed is set by the wood that is met within this distance before and after, mm.
 const NEARBY_MM: f64 = 1.0;
@@ -27,11 +29,12 @@ pub(super) fn on_program_grid(p: DVec3) -> DVec3 {
     DVec3::new(near(p.x), near(p.y), (p.z * 1000.0 - 1e-6).ceil() / 1000.0)
 }
 
-/// The moves of one operation in the making.
+/// The moves of one operation in the making. Clones go on by themselves from here.
+#[derive(Clone)]
 pub(super) struct Emitter<'a> {
     job: &'a Job,
     operation: &'a Operation,
-    ground: Ground<'a>,
+    ground: Shared<Ground<'a>>,
     moves: Vec<Move>,
     arcs: Vec<Arc>,
     /// Chains left out because they have no room to ramp.
@@ -55,7 +58,7 @@ impl<'a> Emitter<'a> {
         Self {
             job,
             operation,
-            ground: Ground { slim, leave_mm },
+            ground: Shared::new(Ground { slim, leave_mm }),
             moves,
             arcs,
             skipped: 0,
@@ -77,6 +80,11 @@ impl<'a> Emitter<'a> {
     /// Number of chains left out.
     pub(super) fn skipped(&self) -> usize {
         self.skipped
+    }
+
+    /// Time that the moves take, s.
+    pub(super) fn seconds(&self) -> f64 {
+        motion::seconds(&self.moves, &self.job.machine)
     }
 
     /// Remembers which of two ways was the quicker one.
@@ -179,7 +187,7 @@ impl<'a> Emitter<'a> {
         let lifted = from.with_z(above.z);
         let entry = Move { from: low, to, kind: self.kind_in_air(to - low), line: 0 };
         let lift = [rapid(from, lifted), rapid(lifted, above), rapid(above, low), entry];
-        let over = (profile, &self.ground);
+        let over = (profile, &*self.ground);
         if let Some(way) = hop(job, self.operation, travel, over, (from, to), &lift) {
             let way = way.into_iter().map(on_program_grid).chain([to]);
             return way.fold(from, |at, p| self.feed(at, p));

@@ -12,6 +12,7 @@
 
 use super::emit::Emitter;
 use super::left::Surfaces;
+use super::needed::MOST_NODES;
 use super::pencil::{pencil, touch_up};
 use super::quicker::outlines_are_quicker;
 use super::raster::{First, Passes, clear_deep_wood, passes, passes_where_wood_is_left};
@@ -57,59 +58,95 @@ pub(super) fn finish(
     block: &mut Block,
     out: &mut Emitter,
 ) -> Result<(), ToolpathError> {
-    let Finish { scallop_mm, angle_rad, mut outlines, is_free } = *cut;
-    let profile = Profile::of(&site.operation.cutter);
+    let Finish { scallop_mm, angle_rad, outlines, is_free } = *cut;
     let stepover_mm = site.stepover_of(scallop_mm)?;
     clear_deep_wood(site, angle_rad, block, out)?;
     let limit_mm = scallop_mm + SPARE * site.job.tolerance.gouge_mm;
     // Where parallel passes could leave more than the limit: cusps grow by 1 / cos^2 of a slope across them.
     let steeper_than_rad = libm::acos((scallop_mm / limit_mm).sqrt()).min(STEEP_RAD);
+    let profile = Profile::of(&site.operation.cutter);
     let rolled = profile.rolled(LEAST_ROUNDING_MM);
     let tip = tip_field(site.target, &rolled);
-    outlines = outlines.filter(|distance| {
-        !is_free || outlines_are_quicker(site, angle_rad, steeper_than_rad, &tip, distance)
-    });
-    if is_free {
-        out.choose(match outlines {
-            Some(_) => "passes follow the outlines, which is quicker than straight rows",
-            None => "passes in straight rows, which is quicker than following the outlines",
-        });
-    }
     let mut site = *site;
     if !site.finished {
         let cut = Contour { scallop_mm, steeper_than_rad, milling: None };
         contour(&site, &cut, block, out)?;
         site.finished = true;
     }
-    let site = &site;
-    let first = First { stepover_mm, angle_rad, outlines };
-    let deepest_mm = passes_where_wood_is_left(site, &first, limit_mm, block, out)?;
-    let Some(deepest_mm) = deepest_mm else { return Ok(()) };
-    out.note_deep_pass(deepest_mm);
-    let reach = closing(&tip, &rolled);
-    let stepover_mm = FRAC_1_SQRT_2 * stepover_mm;
-    let left = |block: &Block| {
-        let surfaces = Surfaces { tip: &tip, reach: &reach, wood: block.field() };
-        surfaces.left(limit_mm, &profile, stepover_mm)
-    };
-    let Some(creases) = left(block) else { return Ok(()) };
-    pencil(site, &creases, first.stepover_mm, block, out);
-    let lines = Waterlines {
-        tip: &tip,
-        reach: &reach,
-        step_mm: stepover_mm,
-        limit_mm,
-        fit_mm: site.job.tolerance.fit_mm,
-    };
-    waterlines(site, &lines, block, out);
-    for (turn, closer) in TURNS {
-        let Some(left) = left(block) else { break };
-        let (stepover_mm, angle_rad) = (closer * stepover_mm, angle_rad + turn);
-        let across = Passes { stepover_mm, angle_rad, only: Some(&left) };
-        passes(site, &across, block, out)?;
+    let rest = Rest { site: &site, profile, rolled, tip: &tip, limit_mm };
+    let rows = First { stepover_mm, angle_rad, outlines: None };
+    let Some(distance) = outlines else { return rest.cut(&rows, block, out) };
+    let along = First { outlines: Some(distance), ..rows };
+    if !is_free {
+        return rest.cut(&along, block, out);
     }
-    if let Some(left) = left(block) {
-        touch_up(site, &left, block, out);
-    }
+    // Both are planned, and the quicker one is taken; where there is no room for two states of the wood, by an estimate.
+    let is_along = if block.field().grid().len() > MOST_NODES {
+        let is_along = outlines_are_quicker(&site, angle_rad, steeper_than_rad, &tip, distance);
+        rest.cut(if is_along { &along } else { &rows }, block, out)?;
+        is_along
+    } else {
+        let (mut other_block, mut other) = (block.clone(), out.clone());
+        rest.cut(&along, &mut other_block, &mut other)?;
+        rest.cut(&rows, block, out)?;
+        let cost = |e: &Emitter| (e.skipped(), e.seconds());
+        let is_along = cost(&other) < cost(out);
+        if is_along {
+            (*block, *out) = (other_block, other);
+        }
+        is_along
+    };
+    out.choose(if is_along {
+        "passes follow the outlines, which is quicker than straight rows"
+    } else {
+        "passes in straight rows, which is quicker than following the outlines"
+    });
     Ok(())
+}
+
+/// What is left to finish beside the walls.
+struct Rest<'a> {
+    site: &'a Site<'a>,
+    profile: Profile,
+    /// The cutter as passes are planned with it.
+    rolled: Profile,
+    /// Its lowest heights.
+    tip: &'a Heightfield,
+    limit_mm: f64,
+}
+
+impl Rest<'_> {
+    /// Passes over all of it, then more where these leave too much.
+    fn cut(
+        &self,
+        first: &First,
+        block: &mut Block,
+        out: &mut Emitter,
+    ) -> Result<(), ToolpathError> {
+        let Self { site, ref profile, ref rolled, tip, limit_mm } = *self;
+        let deepest_mm = passes_where_wood_is_left(site, first, limit_mm, block, out)?;
+        let Some(deepest_mm) = deepest_mm else { return Ok(()) };
+        out.note_deep_pass(deepest_mm);
+        let reach = closing(tip, rolled);
+        let stepover_mm = FRAC_1_SQRT_2 * first.stepover_mm;
+        let left = |block: &Block| {
+            let surfaces = Surfaces { tip, reach: &reach, wood: block.field() };
+            surfaces.left(limit_mm, profile, stepover_mm)
+        };
+        let Some(creases) = left(block) else { return Ok(()) };
+        pencil(site, &creases, first.stepover_mm, block, out);
+        let fit_mm = site.job.tolerance.fit_mm;
+        let lines = Waterlines { tip, reach: &reach, step_mm: stepover_mm, limit_mm, fit_mm };
+        waterlines(site, &lines, block, out);
+        for (turn, closer) in TURNS {
+            let Some(left) = left(block) else { break };
+            let (stepover_mm, angle_rad) = (closer * stepover_mm, first.angle_rad + turn);
+            let across = Passes { stepover_mm, angle_rad, only: Some(&left) };
+            passes(site, &across, block, out)?;
+        }
+        if let Some(left) = left(block) {
+            touch_up(site, &left, block, out);
+        }
+        Ok(())
+    }
 }

@@ -1,4 +1,5 @@
-//! What finishing passes should follow to be done soonest: one direction, or the outlines.
+//! What finishing passes should follow to be done soonest: one direction, or the outlines; an estimate for stock so large
+//! that there is no room to plan both.
 //!
 //! Both lie equally close in plan, so what differs is how much of their way goes steeply down, where the plunge limit holds
 //! them back. Over all ground that passes are for, the time for a millimetre of plan to and fro is added up for

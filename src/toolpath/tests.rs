@@ -193,6 +193,32 @@ fn along_bumps<'a>(target: &'a Heightfield, bumps: &[Bump]) -> Grounds<'a> {
 
 const SIZE: DVec2 = DVec2::new(12.0, 9.0);
 
+/// What is left open is planned both ways, and the way that takes less time by the motion planner is taken, move by move:
+/// over ribs along y, whose outline runs along them, and where the same ribs run along x.
+#[test]
+fn the_quicker_of_rows_and_outlines_is_taken() {
+    for is_along in [true, false] {
+        let planned = |follow: Follow| {
+            let job = job(16.0, 16.0, 10.0, 0.25, vec![finish_along(follow, 2.0, 0.02)]);
+            let grid = Grid::covering(DVec2::ZERO, 16.0, 16.0, 0.25).unwrap();
+            let across = |p: DVec2| if is_along { p.x } else { p.y };
+            let target = Heightfield::from_fn(grid, |p| 0.6 * libm::sin(1.5 * across(p)) - 2.0);
+            let edge = [[7.9, 0.0], [8.1, 0.0], [8.1, 16.0], [7.9, 16.0]].map(DVec2::from);
+            let outlines = crate::surface::Segments::of_rings([&edge[..]]);
+            let grounds = Grounds::from(&target).with_outlines(outlines);
+            let mut notes = Vec::new();
+            let paths = plan(&job, &grounds, &mut |event| notes.push(event)).unwrap();
+            let moves = paths[0].moves.clone();
+            (crate::motion::seconds(&moves, &job.machine), moves, format!("{notes:?}"))
+        };
+        let [rows, outlines, free] =
+            [Follow::Direction, Follow::Outlines, Follow::Quicker].map(planned);
+        assert_eq!(outlines.0 < rows.0, is_along);
+        assert!(free.1 == if is_along { outlines.1 } else { rows.1 });
+        assert_eq!(free.2.contains("passes follow the outlines"), is_along);
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig { cases: 10, ..ProptestConfig::default() })]
 
