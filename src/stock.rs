@@ -188,15 +188,16 @@ impl Block {
             let (a, b) = (&moves[k - 1], &moves[k]);
             a.to == b.from && a.is_rapid() == b.is_rapid() && !alone(k - 1) && !alone(k)
         };
+        let top_mm = self.top_mm;
         let no_joints = |part: Range<usize>| vec![Joint::None; part.len() + 1];
         self.carve(form.radius_mm(), moves, no_joints, |_, band, k, contact| {
             let m = &moves[k];
             let follows = k > 0 && goes_on(k);
             let next = moves.get(k + 1).filter(|_| goes_on(k + 1));
             let drawn = if m.is_rapid() {
-                Drawn::of(m, &slim, None, follows, next)
+                Drawn::of((m, top_mm), &slim, None, follows, next)
             } else {
-                Drawn::of(m, form, reach.as_ref(), follows, next)
+                Drawn::of((m, top_mm), form, reach.as_ref(), follows, next)
             };
             band.carve(&Sweep::Turned(drawn), contact);
         })

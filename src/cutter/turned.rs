@@ -294,8 +294,8 @@ impl Turned {
                 // Beside the arc its end's line or another one is nearer.
                 Form::Arc { r, h, radius } => {
                     let (x, y) = (r_mm - r, h - z_mm);
-                    let steepest = sine(piece.slope(piece.to));
-                    let least = sine(piece.slope(piece.from));
+                    let sine_at = |edge: f64| ((edge - r) / radius).min(1.0);
+                    let (least, steepest) = (sine_at(piece.from), sine_at(piece.to));
                     let far = (x * x + y * y).sqrt();
                     let within = far > 0.0 && y >= 0.0 && {
                         let direction = x / far;

@@ -20,8 +20,10 @@ const STEEP_PITCHES: f64 = 2.0;
 /// Moves that one task looks at.
 const CHUNK: usize = 64;
 
-/// Steps of the search for the deepest point of an edge; each leaves two thirds of it.
-const THIRDS: usize = 24;
+/// The search for the deepest point of an edge ends when this much of it is left, mm.
+const FOUND_MM: f64 = 1e-4;
+/// And the part of it that each step leaves: the golden section, for which one of the two places is known already.
+const GOLDEN: f64 = 0.618_033_988_749_894_9;
 
 /// Penetration beyond the tolerance by less than this is round-off of the stored heights, mm.
 const ROUND_OFF_MM: f64 = 1e-5;
@@ -302,13 +304,26 @@ fn inside(form: &Turned, a: DVec3, b: DVec3, x: DVec3) -> f64 {
 
 /// The highest value of a concave function on the segment from `p` to `q`, and where.
 fn deepest(p: DVec3, q: DVec3, depth: impl Fn(DVec3) -> f64) -> (f64, DVec3) {
+    let at = |part: f64| {
+        let x = p + (q - p) * part;
+        (depth(x), x)
+    };
     let (mut lo, mut hi) = (0.0, 1.0);
-    for _ in 0..THIRDS {
-        let (u, v) = (lo + (hi - lo) / 3.0, hi - (hi - lo) / 3.0);
-        if depth(p + (q - p) * u) < depth(p + (q - p) * v) { lo = u } else { hi = v }
+    let place = |lo: f64, hi: f64| (hi - (hi - lo) * GOLDEN, lo + (hi - lo) * GOLDEN);
+    let (u, v) = place(lo, hi);
+    let (mut left, mut right) = (at(u), at(v));
+    let length = p.distance(q);
+    while (hi - lo) * length > FOUND_MM {
+        let (u, v) = place(lo, hi);
+        if left.0 < right.0 {
+            (lo, left) = (u, right);
+            right = at(place(lo, hi).1);
+        } else {
+            (hi, right) = (v, left);
+            left = at(place(lo, hi).0);
+        }
     }
-    let at = p + (q - p) * (0.5 * (lo + hi));
-    [p, at, q].map(|x| (depth(x), x)).into_iter().max_by(|x, y| x.0.total_cmp(&y.0)).expect("three")
+    [at(0.0), left, right, at(1.0)].into_iter().max_by(|x, y| x.0.total_cmp(&y.0)).expect("three")
 }
 
 fn worse(a: Option<Overcut>, b: Option<Overcut>) -> Option<Overcut> {

@@ -90,6 +90,8 @@ pub(super) struct Drawn<'a> {
     form: &'a Turned,
     reach: Option<&'a Reach>,
     low: DVec3,
+    /// Radius of the part of the end that can meet wood, mm: above it the end is higher than the stock.
+    radius_mm: f64,
     /// Direction in plan from the lower to the higher end; zero for plunges and retracts.
     u: DVec2,
     len: f64,
@@ -102,9 +104,9 @@ pub(super) struct Drawn<'a> {
 }
 
 impl<'a> Drawn<'a> {
-    /// The volume of one move; `follows` says that another one led to its start, `next` is the one that goes on from its end.
+    /// The volume of one move in stock up to `top_mm`; `follows` says that another one led to its start, `next` is the one that goes on from its end.
     pub(super) fn of(
-        mv: &Move,
+        (mv, top_mm): (&Move, f64),
         form: &'a Turned,
         reach: Option<&'a Reach>,
         follows: bool,
@@ -118,6 +120,7 @@ impl<'a> Drawn<'a> {
             form,
             reach: None,
             low,
+            radius_mm: form.radius_mm().min(form.radius_at(top_mm - low.z) + SPAN_SLACK_MM),
             u: DVec2::ZERO,
             len: 0.0,
             m: 0.0,
@@ -155,7 +158,7 @@ impl<'a> Drawn<'a> {
 
     /// Lowest and highest y it can touch.
     pub(super) fn y_range(&self) -> (f64, f64) {
-        let (r, far) = (self.form.radius_mm() + SPAN_SLACK_MM, self.u.y * self.len);
+        let (r, far) = (self.radius_mm + SPAN_SLACK_MM, self.u.y * self.len);
         (self.low.y + far.min(0.0) - r, self.low.y + far.max(0.0) + r)
     }
 
@@ -203,7 +206,7 @@ impl<'a> Drawn<'a> {
         if span.lo > span.hi {
             return Span::EMPTY;
         }
-        let (u, r) = (self.u, self.form.radius_mm());
+        let (u, r) = (self.u, self.radius_mm);
         let (a, b) = ((u.x * dy - u.y * span.lo).abs(), (u.x * dy - u.y * span.hi).abs());
         // q has one sign on the span; where it has two, only the bound from zero on holds.
         let near = if u.y.abs() < PARALLEL { a } else { low(a, b) - SPAN_SLACK_MM };
@@ -230,7 +233,7 @@ impl<'a> Drawn<'a> {
     /// The span of x over which the cutter passes, on the row `dy` above the anchor.
     #[inline]
     fn stadium(&self, dy: f64) -> Span {
-        let r = self.form.radius_mm();
+        let r = self.radius_mm;
         let end = self.u * self.len;
         let far = disc_row(r, dy - end.y);
         let ends = disc_row(r, dy).hull(Span::new(far.lo + end.x, far.hi + end.x));
@@ -271,7 +274,7 @@ impl<'a> Drawn<'a> {
     /// negative.
     #[inline]
     fn served(&self, reach: &Reach, [near, far]: [f64; 2]) -> [f64; 2] {
-        let r = self.form.radius_mm();
+        let r = self.radius_mm;
         let touch = |limit: Limit| {
             let shift = limit.shift_mm + SPAN_SLACK_MM;
             let [near, far] = [high(near - shift, 0.0), low(far + shift, r)];
@@ -349,7 +352,7 @@ impl Shape<2> for Drawn<'_> {
     #[inline(always)]
     fn pieces(&self, lattice: &Lattice, rows: [usize; 2], pieces: &mut Vec<Piece>) -> bool {
         let Some(reach) = self.reach else { return false };
-        let r = self.form.radius_mm();
+        let r = self.radius_mm;
         // Along X the rows are such slices already.
         if self.len > r || self.u.y.abs() < PARALLEL {
             return false;
@@ -369,7 +372,7 @@ impl Shape<2> for Drawn<'_> {
     #[inline(always)]
     fn left(&self, d: DVec2) -> Left {
         let nothing = Left { z: f64::INFINITY, tip: self.low.z, beside: 0.0 };
-        let r = self.form.radius_mm();
+        let r = self.radius_mm;
         let (s, q) = (self.u.dot(d), self.u.perp_dot(d));
         if self.len == 0.0 {
             let off = d.length();
