@@ -14,6 +14,8 @@
 
 /// Steps of a bracketed search.
 const MOST_STEPS: usize = 80;
+/// And it ends with a step of this part of the radius: the next one of Newton's would be lost in rounding.
+const FOUND_PER_RADIUS: f64 = 1e-13;
 
 /// A convex cutting end; see the module.
 #[derive(Debug, Clone, PartialEq)]
@@ -373,15 +375,16 @@ impl Turned {
 }
 
 /// Offset from the circle's centre at which the underside of a torus (circle of `radius` round `r` from the axis), cut
-/// by a plane `aside` from the axis, has the slope; between `lo` and `hi`. Newton's steps; every fourth, and any that leaves
-/// the bracket, halves it.
+/// by a plane `aside` from the axis, has the slope; between `lo` and `hi`. Newton's steps; any that leaves the bracket, or is
+/// more than half of the one before, halves it.
 fn torus(r: f64, radius: f64, aside: f64, slope: f64, mut lo: f64, mut hi: f64) -> f64 {
     let (q2, g2, p2) = (aside * aside, slope * slope, radius * radius);
     let mut u = radius * sine(slope);
     if !(u > lo && u < hi) {
         u = 0.5 * (lo + hi);
     }
-    for step in 0..MOST_STEPS {
+    let mut before = hi - lo;
+    for _ in 0..MOST_STEPS {
         let at = r + u;
         let chord = at * at - q2;
         let value = u * u * chord - g2 * at * at * (p2 - u * u);
@@ -392,13 +395,14 @@ fn torus(r: f64, radius: f64, aside: f64, slope: f64, mut lo: f64, mut hi: f64) 
         }
         let fall = 2.0 * u * chord + 2.0 * u * u * at - 2.0 * g2 * at * (p2 - u * u)
             + 2.0 * g2 * at * at * u;
-        let mut next = u - value / fall;
-        if !(next > lo && next < hi) || step % 4 == 3 {
-            next = 0.5 * (lo + hi);
+        let mut step = -value / fall;
+        let is_good = u + step > lo && u + step < hi && step.abs() <= 0.5 * before;
+        if !is_good {
+            step = 0.5 * (lo + hi) - u;
         }
-        let done = (next - u).abs() <= 1e-15 * radius;
-        u = next;
-        if done {
+        u += step;
+        before = step.abs();
+        if before <= FOUND_PER_RADIUS * radius {
             break;
         }
     }
