@@ -58,6 +58,8 @@ pub struct Block {
     field: Heightfield,
     top_mm: f64,
     thickness_mm: f64,
+    /// The instructions that carve it.
+    path: Path,
 }
 
 /// Rows of nodes that one task carves.
@@ -89,13 +91,14 @@ const CHIP_FROM_MM: f64 = 0.02;
 impl Block {
     /// The uncut blank, flat at z = 0, on `grid`.
     pub fn new(stock: &Stock, grid: Grid) -> Self {
-        Self { field: Heightfield::flat(grid, 0.0), top_mm: 0.0, thickness_mm: stock.thickness_mm }
+        let (field, thickness_mm) = (Heightfield::flat(grid, 0.0), stock.thickness_mm);
+        Self { field, top_mm: 0.0, thickness_mm, path: Path::best() }
     }
 
     /// A blank whose top already has a shape (a pre-machined blank, or the state after earlier work).
     pub fn from_field(stock: &Stock, field: Heightfield) -> Self {
         let top_mm = field.range().map_or(f64::INFINITY, |r| f64::from(r.1));
-        Self { field, top_mm, thickness_mm: stock.thickness_mm }
+        Self { field, top_mm, thickness_mm: stock.thickness_mm, path: Path::best() }
     }
 
     /// The wood's top, mm.
@@ -127,7 +130,7 @@ impl Block {
         let radius_mm = profile.radius_mm() + 0.5 * mv.from.truncate().distance(mv.to.truncate());
         let middle = mv.from.midpoint(mv.to).truncate();
         let Some(field) = self.field.near(middle, radius_mm) else { return true };
-        let mut part = Self { field, top_mm: self.top_mm, thickness_mm: self.thickness_mm };
+        let mut part = Self { field, ..*self };
         part.cut(profile, std::slice::from_ref(mv))[0].deepest_mm <= ROUND_OFF_MM
     }
 
@@ -213,7 +216,7 @@ impl Block {
         one: impl Fn([Joint; 2], &mut Band, usize, &mut Contact) + Sync,
     ) -> Vec<Contact> {
         let mut contacts = vec![Contact::default(); moves.len()];
-        let (lattice, path) = (Lattice::new(*self.field.grid()), Path::best());
+        let (lattice, path) = (Lattice::new(*self.field.grid()), self.path);
         for start in (0..moves.len()).step_by(MOVES_AT_ONCE) {
             let part = start..moves.len().min(start + MOVES_AT_ONCE);
             let joints = joints(part.clone());

@@ -65,6 +65,41 @@ fn searched(profile: &Profile, reach: f64, moves: &[Move], p: DVec2) -> f64 {
     lowest
 }
 
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 8, ..ProptestConfig::default() })]
+
+    /// Whatever instructions the machine has, the wood and what the moves met are the same bit by bit.
+    #[test]
+    fn every_instruction_set_carves_the_same_bits(
+        points in prop::collection::vec((0.0..12.0_f64, 0.0..10.0_f64, -4.0..1.0_f64), 2..60),
+        short in prop::collection::vec((-0.2..0.2_f64, -0.2..0.2_f64, -0.1..0.1_f64), 100..160),
+    ) {
+        let mut path: Vec<[f64; 3]> = points.iter().map(|&(x, y, z)| [x, y, z]).collect();
+        let mut at = path[path.len() - 1];
+        for (x, y, z) in short {
+            at = [at[0] + x, at[1] + y, at[2] + z];
+            path.push(at);
+        }
+        let moves = chain(&path);
+        for profile in [BALL, FLAT].into_iter().chain(convex_forms()) {
+            let carved = |path: Path| {
+                let mut block = Block { path, ..block(0.1) };
+                let met = block.cut(&profile, &moves);
+                let bits: Vec<u32> = block.field().z().iter().map(|z| z.to_bits()).collect();
+                let met: Vec<[u32; 3]> = met
+                    .iter()
+                    .map(|c| [c.deepest_mm, c.engaged_mm, c.chip].map(f32::to_bits))
+                    .collect();
+                (bits, met)
+            };
+            let best = carved(Path::best());
+            for path in Path::available() {
+                prop_assert!(carved(path) == best, "{path:?} {profile:?}");
+            }
+        }
+    }
+}
+
 /// Holds every node of the block against the search. A node on a rim, where the height jumps, may fall on
 /// either side.
 fn check(block: &Block, profile: &Profile, moves: &[Move]) {
