@@ -53,12 +53,11 @@ pub fn surfaces_html(shown: &SideBySide<'_>, sheet: &[u8]) -> String {
             body {
                 main {
                     header { div { h1 { (title) } p.lead { (shown.facts) } } }
-                    (table(shown))
-                    (exceptions(shown))
                     figure {
                         img alt=(picture.title) src=(data_uri(&picture.png));
                         figcaption { strong { (picture.title) } " " (picture.caption) }
                     }
+                    (table(shown))
                     section {
                         h2 { "What the figures mean" }
                         table.facts {
@@ -71,6 +70,7 @@ pub fn surfaces_html(shown: &SideBySide<'_>, sheet: &[u8]) -> String {
                             }
                         }
                     }
+                    (exceptions(shown))
                     footer { "Made by relievo. Lengths in millimetres." }
                 }
             }
