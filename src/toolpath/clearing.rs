@@ -42,8 +42,11 @@ impl Clearing {
                     return self.rings(site, milling, block, out);
                 }
                 let (mut other_block, mut other) = (block.clone(), Emitter::new(site));
-                self.rings(site, milling, block, out)?;
-                let rows = self.rows(site, angle_rad, &mut other_block, &mut other);
+                let (rings, rows) = rayon::join(
+                    || self.rings(site, milling, block, out),
+                    || self.rows(site, angle_rad, &mut other_block, &mut other),
+                );
+                rings?;
                 let is_complete = rows.is_ok() && other.skipped() <= out.skipped();
                 if is_complete && other.seconds() <= ROWS_PER_RINGS * out.seconds() {
                     (*block, *out) = (other_block, other);

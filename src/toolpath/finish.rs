@@ -87,8 +87,11 @@ pub(super) fn finish(
         is_along
     } else {
         let (mut other_block, mut other) = (block.clone(), out.clone());
-        rest.cut(&along, &mut other_block, &mut other)?;
-        rest.cut(&rows, block, out)?;
+        let (one, two) = rayon::join(
+            || rest.cut(&along, &mut other_block, &mut other),
+            || rest.cut(&rows, block, out),
+        );
+        one.and(two)?;
         let cost = |e: &Emitter| (e.skipped(), e.seconds());
         let is_along = cost(&other) < cost(out);
         if is_along {
