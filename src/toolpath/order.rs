@@ -6,9 +6,9 @@
 use crate::geom::{DVec2, DVec3};
 
 /// Neighbours of a chain's end that are looked at.
-const NEAR: usize = 8;
+const NEAR: usize = 12;
 /// Longest piece of the order that Or-opt moves.
-const LONGEST_PIECE: usize = 3;
+const LONGEST_PIECE: usize = 12;
 /// Changes tried, at most, for each chain.
 const TRIES_PER_CHAIN: usize = 2000;
 /// Gains smaller than this are round-off, mm.
