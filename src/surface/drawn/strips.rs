@@ -17,6 +17,7 @@ use crate::geom::{DVec2, DVec3, DVec4, distance_to_segment, orient};
 use crate::outline::Region;
 use crate::surface::Segments;
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 /// Half the width of a strip that nobody gave one, in distances from the crest to the outline.
 const WIDTH: f64 = 0.12;
@@ -113,15 +114,21 @@ impl Widths<'_> {
         width.unwrap_or_else(|| (WIDTH * far).max(least) * self.part)
     }
 
-    /// The steps from a line's control points to the left edge of its strip.
+    /// The steps from some of a line's control points to the left edge of its strip.
     ///
     /// # Errors
     /// [`CrestFault::Bend`]: the width given is more than the radius of a bend.
-    fn asides(&self, plan: &[DVec2], closed: bool, line: usize) -> Result<Vec<DVec2>, CrestFault> {
+    fn asides(
+        &self,
+        plan: &[DVec2],
+        some: Range<usize>,
+        closed: bool,
+        line: usize,
+    ) -> Result<Vec<DVec2>, CrestFault> {
         let n = plan.len();
         let Line { name, half_width_mm, .. } = &self.lines[line];
-        let mut out = Vec::with_capacity(n);
-        for k in 0..n {
+        let mut out = Vec::with_capacity(some.len());
+        for k in some {
             let (before, after) = if closed {
                 (plan[(k + n - 1) % n], plan[(k + 1) % n])
             } else {
@@ -326,8 +333,8 @@ impl Strips {
             last = n - 2;
             on[1] = spacings.pop().unwrap_or(1.0);
         }
-        let mut asides = widths.asides(&plan, closed, arm.line)?;
         let last = last.max(first);
+        let mut asides = widths.asides(&plan, first..last, closed, arm.line)?;
         if lines[arm.line].half_width_mm.is_none() {
             let ahead = match arm.ends[1] {
                 End::Joint { joint, slot } => {
@@ -338,7 +345,7 @@ impl Strips {
             };
             let sides =
                 [columns.first().copied(), ahead].map(|c| c.map(|c| c.map(|v| self.plan(v))));
-            narrow(&plan[first..last], &mut asides[first..last], sides, closed);
+            narrow(&plan[first..last], &mut asides, sides, closed);
         }
         for k in first..last {
             if let Some(end) = [0, 1].into_iter().find(|&end| {
@@ -347,7 +354,7 @@ impl Strips {
                 columns.push(self.landed(end, k, &points, lines, arm.line, widths)?);
                 continue;
             }
-            let aside = asides[k].extend(0.0).extend(0.0) * points[k].w;
+            let aside = asides[k - first].extend(0.0).extend(0.0) * points[k].w;
             let row = [points[k] - aside, points[k], points[k] + aside];
             columns.push(row.map(|p| self.add(p, name)));
         }
