@@ -104,7 +104,8 @@ pub(super) struct Drawn<'a> {
 }
 
 impl<'a> Drawn<'a> {
-    /// The volume of one move in stock up to `top_mm`; `follows` says that another one led to its start, `next` is the one that goes on from its end.
+    /// The volume of one move in stock up to `top_mm`; `follows` says that another one led to its start, `next` is the one
+    /// that goes on from its end.
     pub(super) fn of(
         (mv, top_mm): (&Move, f64),
         form: &'a Turned,
