@@ -73,7 +73,8 @@ pub(super) fn finish(
         contour(&site, &cut, block, out)?;
         site.finished = true;
     }
-    let rest = Rest { site: &site, profile, rolled, tip: &tip, limit_mm };
+    let reach = closing(&tip, &rolled);
+    let rest = Rest { site: &site, profile, tip: &tip, reach: &reach, limit_mm };
     let rows = First { stepover_mm, angle_rad, outlines: None };
     let Some(distance) = outlines else { return rest.cut(&rows, block, out) };
     let along = First { outlines: Some(distance), ..rows };
@@ -111,10 +112,9 @@ pub(super) fn finish(
 struct Rest<'a> {
     site: &'a Site<'a>,
     profile: Profile,
-    /// The cutter as passes are planned with it.
-    rolled: Profile,
-    /// Its lowest heights.
+    /// The lowest heights of the tip, and of the ground that it reaches.
     tip: &'a Heightfield,
+    reach: &'a Heightfield,
     limit_mm: f64,
 }
 
@@ -126,20 +126,19 @@ impl Rest<'_> {
         block: &mut Block,
         out: &mut Emitter,
     ) -> Result<(), ToolpathError> {
-        let Self { site, ref profile, ref rolled, tip, limit_mm } = *self;
+        let Self { site, ref profile, tip, reach, limit_mm } = *self;
         let deepest_mm = passes_where_wood_is_left(site, first, limit_mm, block, out)?;
         let Some(deepest_mm) = deepest_mm else { return Ok(()) };
         out.note_deep_pass(deepest_mm);
-        let reach = closing(tip, rolled);
         let stepover_mm = FRAC_1_SQRT_2 * first.stepover_mm;
         let left = |block: &Block| {
-            let surfaces = Surfaces { tip, reach: &reach, wood: block.field() };
+            let surfaces = Surfaces { tip, reach, wood: block.field() };
             surfaces.left(limit_mm, profile, stepover_mm)
         };
         let Some(creases) = left(block) else { return Ok(()) };
         pencil(site, &creases, first.stepover_mm, block, out);
         let fit_mm = site.job.tolerance.fit_mm;
-        let lines = Waterlines { tip, reach: &reach, step_mm: stepover_mm, limit_mm, fit_mm };
+        let lines = Waterlines { tip, reach, step_mm: stepover_mm, limit_mm, fit_mm };
         waterlines(site, &lines, block, out);
         for (turn, closer) in TURNS {
             let Some(left) = left(block) else { break };

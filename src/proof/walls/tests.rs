@@ -98,3 +98,21 @@ proptest! {
         prop_assert!(d <= want + 1e-9 && d >= want - 0.3, "{d} {want}");
     }
 }
+
+/// The deepest point of an edge against 20001 places on it: of a dome, of a roof with a kink, and where it is an end.
+#[test]
+fn the_deepest_point_is_as_deep_as_the_best_of_many() {
+    let (p, q) = (DVec3::new(1.0, 2.0, -3.0), DVec3::new(1.1, 2.0, 4.0));
+    for k in 0..=20 {
+        let top = f64::from(k) / 20.0 * 9.0 - 4.0;
+        let dome = |x: DVec3| 0.3 - 0.7 * (x.z - top).powi(2);
+        let roof = |x: DVec3| (0.9 * (x.z - top)).min(-0.2 * (x.z - top));
+        let depths: [&dyn Fn(DVec3) -> f64; 2] = [&dome, &roof];
+        for depth in depths {
+            let many = (0..=20_000).map(|k| depth(p.lerp(q, f64::from(k) / 20_000.0)));
+            let best = many.fold(f64::NEG_INFINITY, f64::max);
+            let (found, at) = deepest(p, q, depth);
+            assert!(found >= best - FOUND_MM && found == depth(at), "{top}: {found} {best}");
+        }
+    }
+}
