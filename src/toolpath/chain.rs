@@ -22,7 +22,7 @@ pub(super) fn chains(
     for start in 0..rows.len() {
         for k in 0..rows[start].len() {
             let Some(mut chain) = rows[start][k].take() else { continue };
-            if direction == Direction::Both
+            if direction != Direction::Fixed
                 && let Some(end) = chains.last().and_then(|c| c.last())
                 && end.distance_squared(chain[chain.len() - 1]) < end.distance_squared(chain[0])
             {
@@ -53,7 +53,7 @@ fn extend(
     for (k, span) in row.iter().enumerate() {
         let Some(span) = span else { continue };
         ends.push((at.distance_squared(span[0]), k, false));
-        if direction == Direction::Both {
+        if direction != Direction::Fixed {
             ends.push((at.distance_squared(span[span.len() - 1]), k, true));
         }
     }

@@ -1,6 +1,7 @@
 //! What must hold for every toolpath.
 
 use super::Toolpath;
+use super::emit::AIR_GAIN;
 use crate::geom::{DVec3, Move, MoveKind};
 use crate::job::{Job, Operation};
 
@@ -124,7 +125,7 @@ impl Toolpath {
     /// Checks the laws of every toolpath: moves are continuous and finite, start and end at safe Z, stay above the
     /// stock's rectangle and within the machine's travel; rapids are vertical, level or at safe Z; feeds are
     /// positive and go down no faster than the plunge limit of the operations that use this cutter or, to below the top of
-    /// the stock, their feed: ways down in hollows carved before (that those faster than the plunge limit meet no wood is
+    /// the stock, twice their feed: ways down in hollows carved before (that those faster than the plunge limit meet no wood is
     /// for the dry run to prove); arcs are made of feed moves at one speed, one after the other.
     ///
     /// # Errors
@@ -154,7 +155,7 @@ impl Toolpath {
             own.map(of).fold(0.0, f64::max)
         };
         let plunge = limit(|o| o.plunge_mm_per_min);
-        let descent = plunge.max(limit(|o| o.feed_mm_per_min));
+        let descent = plunge.max(AIR_GAIN * limit(|o| o.feed_mm_per_min));
         let (mut low, mut high) = (first.from, first.from);
         let mut at = first.from;
         for (index, m) in self.moves.iter().enumerate() {

@@ -3,7 +3,7 @@
 use super::Site;
 use super::arcs::{Arc, Fitter};
 use super::hop::{Ground, hop};
-use super::order::{Direction, in_order};
+use super::order::{Direction, in_order, in_turn};
 use super::ramp::ramp_onto;
 use super::trace::{DROP_MM, LEAST_ROUNDING_MM};
 use super::travel::{CARVED_MM, Travel, ramp_gap_mm};
@@ -18,7 +18,10 @@ use std::collections::VecDeque;
 use std::sync::Arc as Shared;
 
 /// A feed is set by the wood that is met within this distance before and after, mm.
-const NEARBY_MM: f64 = 1.0;
+const NEARBY_MM: f64 = 0.5;
+
+/// Ways down that meet no wood go faster than the feed, as thin chips do.
+pub(super) const AIR_GAIN: f64 = 2.0;
 
 /// The last digit of a program, mm.
 const STEP_MM: f64 = 0.001;
@@ -137,11 +140,30 @@ impl<'a> Emitter<'a> {
     ) {
         for chain in in_order(chains, direction, self.at()) {
             for part in parts(chain, block) {
-                let first = self.moves.len();
-                self.chain(&part, profile, block);
-                self.cut(first, profile, block);
+                self.pass(&part, profile, block);
             }
         }
+    }
+
+    /// Cuts chains that are given in an order in which they may be cut, in one with less travel: what each of them meets is the
+    /// same.
+    pub(super) fn passes_in_turn(
+        &mut self,
+        chains: Vec<Vec<DVec3>>,
+        direction: Direction,
+        profile: &Profile,
+        block: &mut Block,
+    ) {
+        let reach_mm = 2.0 * profile.radius_mm() + block.field().grid().pitch_mm;
+        for chain in in_turn(chains, direction, self.at(), reach_mm) {
+            self.pass(&chain, profile, block);
+        }
+    }
+
+    fn pass(&mut self, chain: &[DVec3], profile: &Profile, block: &mut Block) {
+        let first = self.moves.len();
+        self.chain(chain, profile, block);
+        self.cut(first, profile, block);
     }
 
     /// Goes to the start of the chain, enters and cuts; the tool stays down. `block`: the wood as it is. A chain without room
@@ -149,8 +171,10 @@ impl<'a> Emitter<'a> {
     fn chain(&mut self, chain: &[DVec3], profile: &Profile, block: &Block) {
         let safe_z_mm = self.job.safe_z_mm;
         let wood_mm = touch_mm(profile, block, chain[0].truncate());
-        // Where the cutter touches no wood at the start it goes straight there.
-        let ramp_z = if wood_mm > chain[0].z { wood_mm + ramp_gap_mm(wood_mm) } else { chain[0].z };
+        // Where the cutter meets no wood at the start it goes straight there. Beside a wall that it has cut itself it meets none,
+        // but touches the slope that a grid makes of the wall.
+        let met_mm = meets_mm(profile, block, chain[0].truncate());
+        let ramp_z = if met_mm > chain[0].z { met_mm + ramp_gap_mm(met_mm) } else { chain[0].z };
         let ramp_z = ramp_z.min(safe_z_mm.max(chain[0].z));
         let Some(entry) = ramp_onto(chain, ramp_z, libm::tan(self.job.ramp_rad)) else {
             self.skipped += 1;
@@ -199,8 +223,12 @@ impl<'a> Emitter<'a> {
     }
 
     fn kind_in_air(&self, way: DVec3) -> MoveKind {
-        let feed_mm_per_min =
-            feed_in_air(way, self.operation.feed_mm_per_min, self.operation, &self.job.machine);
+        let feed_mm_per_min = feed_in_air(
+            way,
+            AIR_GAIN * self.operation.feed_mm_per_min,
+            self.operation,
+            &self.job.machine,
+        );
         MoveKind::Feed { feed_mm_per_min }
     }
 
@@ -246,7 +274,7 @@ impl<'a> Emitter<'a> {
         for (k, m) in moves.iter().enumerate() {
             if clear[k] && m.to.z < -CARVED_MM {
                 let way = m.to - m.from;
-                let speed = feed_in_air(way, base, self.operation, &self.job.machine);
+                let speed = feed_in_air(way, AIR_GAIN * base, self.operation, &self.job.machine);
                 speeds[k] = speeds[k].max(speed);
             }
         }
@@ -298,6 +326,17 @@ fn is_held_back(m: &Move, operation: &Operation) -> bool {
 fn touch_mm(profile: &Profile, block: &Block, p: DVec2) -> f64 {
     let wood = block.field().near(p, profile.radius_mm());
     wood.map_or(f64::NEG_INFINITY, |wood| Dropper::new(&wood, profile.clone()).drop(p))
+}
+
+/// Height of the tip at which a cutter that comes straight down over a point meets wood at a node, mm.
+fn meets_mm(profile: &Profile, block: &Block, p: DVec2) -> f64 {
+    let Some(wood) = block.field().near(p, profile.radius_mm()) else { return f64::NEG_INFINITY };
+    let grid = wood.grid();
+    let nodes = wood.z().iter().enumerate().filter_map(|(k, z)| {
+        let away_mm = grid.node(k % grid.nx, k / grid.nx).distance(p);
+        Some(f64::from(*z) - profile.height_at(away_mm)?)
+    });
+    nodes.fold(f64::NEG_INFINITY, f64::max)
 }
 
 /// The largest of a figure (by index) for each move and the moves within [`NEARBY_MM`] of way before and after it.

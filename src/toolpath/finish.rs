@@ -40,6 +40,10 @@ const STEEP_RAD: f64 = FRAC_PI_4;
 /// Part of `gouge_mm` that may be left above the scallop height before more passes are worth it.
 const SPARE: f64 = 0.75;
 
+/// The first passes climb walls, which are finished, no further than this, in stepovers; what they miss by that is for the
+/// passes that follow.
+const CLIMB: f64 = 0.25;
+
 /// The numbers of finishing.
 pub(super) struct Finish<'a> {
     pub(super) scallop_mm: f64,
@@ -75,7 +79,7 @@ pub(super) fn finish(
     }
     let reach = closing(&tip, &rolled);
     let rest = Rest { site: &site, profile, tip: &tip, reach: &reach, limit_mm };
-    let rows = First { stepover_mm, angle_rad, outlines: None };
+    let rows = First { stepover_mm, angle_rad, outlines: None, climb: CLIMB };
     let Some(distance) = outlines else { return rest.cut(&rows, block, out) };
     let along = First { outlines: Some(distance), ..rows };
     if !is_free {

@@ -9,7 +9,7 @@
 //!      `-'             `-'
 //! ```
 
-use super::emit::feed_in_air;
+use super::emit::{AIR_GAIN, feed_in_air};
 use super::fit::fit;
 use super::trace::{DROP_MM, Sample};
 use super::travel::{GAP_MM, Travel, ramp_gap_mm};
@@ -69,7 +69,7 @@ pub(super) fn hop(
     let feeds = |points: &[DVec3]| -> Vec<Move> {
         let leg = |e: &[DVec3]| {
             let feed_mm_per_min =
-                feed_in_air(e[1] - e[0], operation.feed_mm_per_min, operation, machine);
+                feed_in_air(e[1] - e[0], AIR_GAIN * operation.feed_mm_per_min, operation, machine);
             Move { from: e[0], to: e[1], kind: MoveKind::Feed { feed_mm_per_min }, line: 0 }
         };
         points.windows(2).filter(|e| e[0] != e[1]).map(leg).collect()

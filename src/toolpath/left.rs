@@ -10,7 +10,7 @@ use rayon::prelude::*;
 /// Half the diagonal of a cell, in its sides, and a little.
 const HALF_DIAGONAL: f64 = 0.71;
 /// The tip may climb this many stepovers above the work: up to walls, not over them.
-const CLIMB: f64 = 2.0;
+pub(super) const CLIMB: f64 = 2.0;
 
 /// What finishing is measured on, all over one grid.
 pub(super) struct Surfaces<'a> {
@@ -34,7 +34,14 @@ pub(super) enum Todo {
 
 /// What earlier finishing has left to an operation: wood that stands more than `limit_mm` above what its cutter can
 /// reach.
-pub(super) fn todo(site: &Site, limit_mm: f64, stepover_mm: f64, wood: &Heightfield) -> Todo {
+/// `climb`: how far the tip may climb above the work, in stepovers.
+pub(super) fn todo(
+    site: &Site,
+    limit_mm: f64,
+    stepover_mm: f64,
+    climb: f64,
+    wood: &Heightfield,
+) -> Todo {
     if !site.finished {
         return Todo::All;
     }
@@ -43,7 +50,7 @@ pub(super) fn todo(site: &Site, limit_mm: f64, stepover_mm: f64, wood: &Heightfi
     let tip = tip_field(site.target, &rolled);
     let reach = closing(&tip, &rolled);
     let surfaces = Surfaces { tip: &tip, reach: &reach, wood };
-    surfaces.left(limit_mm, &profile, stepover_mm).map_or(Todo::Nothing, Todo::Here)
+    surfaces.left_to(climb, limit_mm, &profile, stepover_mm).map_or(Todo::Nothing, Todo::Here)
 }
 
 /// Where the cutter's axis has to pass to take away what is left.
@@ -59,6 +66,17 @@ impl Surfaces<'_> {
     /// The places for wood that stands more than `limit_mm` above what can be reached, normal to it; `None` when there
     /// is none.
     pub(super) fn left(&self, limit_mm: f64, profile: &Profile, stepover_mm: f64) -> Option<Left> {
+        self.left_to(CLIMB, limit_mm, profile, stepover_mm)
+    }
+
+    /// As [`Surfaces::left`], where the tip may climb `climb` stepovers above the work.
+    fn left_to(
+        &self,
+        climb: f64,
+        limit_mm: f64,
+        profile: &Profile,
+        stepover_mm: f64,
+    ) -> Option<Left> {
         let grid = *self.reach.grid();
         let cutter = &Disc::new(profile, grid.pitch_mm);
         let mut axes: Vec<usize> = (0..grid.ny)
@@ -74,7 +92,7 @@ impl Surfaces<'_> {
         axes.dedup();
         let mut cap_mm = vec![f32::NEG_INFINITY; grid.len()];
         for &k in &axes {
-            cap_mm[k] = self.tip.z()[k] + (CLIMB * stepover_mm) as f32;
+            cap_mm[k] = self.tip.z()[k] + (climb * stepover_mm) as f32;
         }
         // A place is as good as the node there, at most half a diagonal away.
         let near = 0.5 * stepover_mm / grid.pitch_mm + HALF_DIAGONAL;

@@ -15,6 +15,8 @@ const ROOM_MM: f64 = 0.5;
 const LEADS_PER_DIAMETER: f64 = 2.0;
 /// Way that is cut before the rest is held against what it leaves, in diameters.
 const PIECE_PER_DIAMETER: f64 = 2.0;
+/// Steps of a way that are longer are judged piece by piece, in diameters.
+const STEP_PER_DIAMETER: f64 = 1.0;
 /// Two states of wood with more nodes would need too much memory.
 pub(super) const MOST_NODES: usize = 60_000_000;
 
@@ -42,14 +44,21 @@ impl<'a> Needed<'a> {
         Self { site, profile, slim: profile.slimmed(limit_mm), limit_mm, wood }
     }
 
+    /// The wood as what was needed so far leaves it; `None` where there is no room for it.
+    pub(super) fn wood(&self) -> Option<&Block> {
+        self.wood.as_ref()
+    }
+
     /// The parts of a way on which the cutter meets wood when it gets there, with a little room at both ends. Ways through
-    /// air between two of them stay where lifting is slower. `block`: the wood as it is when the way begins.
+    /// air between two of them stay where lifting is slower. `block`: the wood as it is when the way begins, or before.
     pub(super) fn parts(&mut self, way: &[DVec3], block: &Block) -> Vec<Vec<DVec3>> {
-        let meets = self.meets(way, block);
+        let most_mm = STEP_PER_DIAMETER * self.site.operation.cutter.working_mm();
+        let (way, is_added) = split(way, most_mm);
+        let meets = self.meets(&way, block);
         let travel = Travel::new(self.site.job, self.site.operation, block);
         let mut parts: Vec<(usize, usize)> = Vec::new();
         for step in (0..meets.len()).filter(|&k| meets[k]) {
-            let (from, to) = (room(way, step, true), room(way, step + 1, false));
+            let (from, to) = (room(&way, step, true), room(&way, step + 1, false));
             match parts.last_mut() {
                 Some(last) if from <= last.1 || stays(self.site, &travel, &way[last.1..=from]) => {
                     last.1 = last.1.max(to);
@@ -57,7 +66,11 @@ impl<'a> Needed<'a> {
                 _ => parts.push((from, to)),
             }
         }
-        parts.into_iter().map(|(from, to)| way[from..=to].to_vec()).collect()
+        let part = |(from, to): (usize, usize)| {
+            let kept = (from..=to).filter(|&k| k == from || k == to || !is_added[k]);
+            kept.map(|k| way[k]).collect()
+        };
+        parts.into_iter().map(part).collect()
     }
 
     /// Which steps of the way meet wood.
@@ -92,6 +105,18 @@ impl<'a> Needed<'a> {
         }
         all
     }
+}
+
+/// The way with points put into steps that are longer than `most_mm`, and which points these are.
+fn split(way: &[DVec3], most_mm: f64) -> (Vec<DVec3>, Vec<bool>) {
+    let mut points: Vec<(DVec3, bool)> = way.first().map(|&p| (p, false)).into_iter().collect();
+    for step in way.windows(2) {
+        let n = (step[0].distance(step[1]) / most_mm).ceil().max(1.0) as usize;
+        let at = |k: usize| step[0].lerp(step[1], k as f64 / n as f64);
+        points.extend((1..n).map(|k| (at(k), true)));
+        points.push((step[1], false));
+    }
+    points.into_iter().unzip()
 }
 
 /// True when lifting, and coming in again, is slower than going on.
@@ -158,6 +183,31 @@ mod tests {
         // The tip 0.1 mm inside the ridges.
         assert_eq!((parts(-1.1, 0.05).len(), parts(-1.1, 0.15).len()), (2, 0));
         assert!(parts(-0.99, 0.0).is_empty());
+    }
+
+    /// Of one long straight step that meets wood in one place, no more is cut than around it; of one that meets wood all
+    /// along, no points are left in it.
+    #[test]
+    fn long_steps_are_judged_piece_by_piece() {
+        let job = job(200.0, 10.0, 12.0, 0.1, vec![finish(cutter(CutterShape::Ball, 2.0), 0.02)]);
+        let grid = Grid::covering(DVec2::ZERO, 200.0, 10.0, 0.1).unwrap();
+        let (operation, number) = (&job.operations[0], 1);
+        let (fresh, finished) = (false, false);
+        let profile = Profile::of(&operation.cutter);
+        let way = [DVec3::new(2.0, 5.0, -2.0), DVec3::new(198.0, 5.0, -2.0)];
+        let parts = |wide_mm: f64| {
+            let wood = Heightfield::from_fn(grid, |p| {
+                if (p.x - 100.0).abs() <= wide_mm { -1.0 } else { -3.0 }
+            });
+            let site = Site { job: &job, target: &wood, operation, number, fresh, finished };
+            let block = Block::from_field(&job.stock, wood.clone());
+            Needed::new(&site, &profile, 0.01, &block).parts(&way, &block)
+        };
+        let [part] = &parts(1.0)[..] else { panic!("one part") };
+        let spare = STEP_PER_DIAMETER * 2.0 + ROOM_MM;
+        assert!((98.0 - 2.0 * spare..98.1).contains(&part[0].x), "{part:?}");
+        assert!((101.9..102.0 + 2.0 * spare).contains(&part[part.len() - 1].x), "{part:?}");
+        assert_eq!(parts(200.0), [way.to_vec()]);
     }
 
     /// A ring that is run three times: what the first run takes is not there for the others.

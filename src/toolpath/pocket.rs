@@ -14,7 +14,7 @@ use super::contours::{Cells, Edge, checked, chords, reached, runs_with};
 use super::emit::{Emitter, feed_seconds};
 use super::levels::levels;
 use super::needed::Needed;
-use super::order::Direction;
+use super::order::{Direction, in_order};
 use super::rows::rim;
 use super::trace::{DROP_MM, LEAST_ROUNDING_MM};
 use super::travel::Travel;
@@ -103,8 +103,13 @@ pub(super) fn pockets(
     let disc = Profile::Flat { radius_mm: profile.radius_mm() };
     let cells = Cells::new(&allowed);
     let depths = levels(&allowed, cut.stepdown_mm, FILM_MM);
+    // Where there is room for what all levels leave, they are planned first: the cutter may then go down in one place before
+    // it goes on to the next.
+    let mut needed = Needed::new(site, &profile, FILM_MM, block);
+    let mut passes: Vec<Vec<DVec3>> = Vec::new();
     for &z in &depths {
-        let wood = tip_field(block.field(), &disc);
+        let above = needed.wood().unwrap_or(block);
+        let wood = tip_field(above.field(), &disc);
         let level = Level {
             z,
             stock: site.job.stock.bounds().grown(RIM_MM),
@@ -117,12 +122,18 @@ pub(super) fn pockets(
             wanted: &wanted,
             is_pointed,
         };
-        let chains = level.chains(site, &Travel::new(site.job, site.operation, block));
-        let mut needed = Needed::new(site, &profile, FILM_MM, block);
-        out.passes_in_parts(chains, Direction::Fixed, &profile, block, |chain, block| {
-            needed.parts(&chain, block)
-        });
+        let chains = level.chains(site, &Travel::new(site.job, site.operation, above));
+        if needed.wood().is_some() {
+            let at = passes.last().and_then(|last| last.last().copied());
+            let chains = in_order(chains, Direction::Fixed, at);
+            passes.extend(chains.into_iter().flat_map(|chain| needed.parts(&chain, block)));
+        } else {
+            out.passes_in_parts(chains, Direction::Fixed, &profile, block, |chain, block| {
+                needed.parts(&chain, block)
+            });
+        }
     }
+    out.passes_in_turn(passes, Direction::Fixed, &profile, block);
     Ok(())
 }
 

@@ -10,7 +10,7 @@ use super::chain::{Span, chains};
 use super::emit::{Emitter, feed_seconds};
 use super::fit::fit;
 use super::inward::{Inward, inward};
-use super::left::{Left, Todo, todo};
+use super::left::{CLIMB, Left, Todo, todo};
 use super::order::Direction;
 use super::rough::{Rough, rough};
 use super::rows::{Row, rim, rows, slanted_rim};
@@ -71,7 +71,7 @@ pub(super) fn raster(
     };
     clear_deep_wood(site, angle_rad, block, out)?;
     let limit_mm = site.job.tolerance.scallop_mm + site.job.tolerance.gouge_mm;
-    let first = First { stepover_mm, angle_rad, outlines: None };
+    let first = First { stepover_mm, angle_rad, outlines: None, climb: CLIMB };
     let deepest_mm = passes_where_wood_is_left(site, &first, limit_mm, block, out)?;
     out.note_deep_pass(deepest_mm.unwrap_or(0.0));
     Ok(())
@@ -85,6 +85,8 @@ pub(super) struct First<'a> {
     pub(super) angle_rad: f64,
     /// Distance from the outlines that they follow instead, mm.
     pub(super) outlines: Option<&'a Heightfield>,
+    /// How far the tip may climb above the work, in stepovers, where not all is to be cut.
+    pub(super) climb: f64,
 }
 
 /// Passes over everything or, after earlier finishing, where that has left more than `limit_mm` within reach; `None` when
@@ -96,8 +98,8 @@ pub(super) fn passes_where_wood_is_left(
     block: &mut Block,
     out: &mut Emitter,
 ) -> Result<Option<f64>, ToolpathError> {
-    let First { stepover_mm, angle_rad, outlines } = *cut;
-    let todo = todo(site, limit_mm, stepover_mm, block.field());
+    let First { stepover_mm, angle_rad, outlines, climb } = *cut;
+    let todo = todo(site, limit_mm, stepover_mm, climb, block.field());
     let only = match &todo {
         Todo::Nothing => return Ok(None),
         Todo::All => None,

@@ -2,7 +2,8 @@
 
 use super::chain::{Span, chains};
 use super::emit::{Emitter, feed_seconds};
-use super::order::Direction;
+use super::needed::Needed;
+use super::order::{Direction, in_order};
 use super::rows::{Row, rows};
 use super::trace::{DROP_MM, LEAST_ROUNDING_MM, Sample, Tracer};
 use super::travel::Travel;
@@ -105,6 +106,8 @@ pub(super) fn rough(
         return Ok(());
     }
     let levels = (-lowest / cut.stepdown_mm - 1e-9).ceil().max(1.0) as usize;
+    let mut needed = Needed::new(site, &profile, FILM_MM, block);
+    let mut passes: Vec<Vec<DVec3>> = Vec::new();
     for k in 1..=levels {
         let z = lowest * (k as f64 / levels as f64);
         let mut by_row: Vec<Vec<Span>> = vec![Vec::new(); count];
@@ -122,8 +125,15 @@ pub(super) fn rough(
             way.iter().all(|p| is_allowed(p, z)).then(Vec::new)
         };
         let chains = chains(by_row, Direction::Both, link);
-        out.passes(chains, Direction::Both, &profile, block);
+        if needed.wood().is_some() {
+            let at = passes.last().and_then(|last| last.last().copied());
+            let chains = in_order(chains, Direction::Both, at);
+            passes.extend(chains.into_iter().flat_map(|chain| needed.parts(&chain, block)));
+        } else {
+            out.passes(chains, Direction::Both, &profile, block);
+        }
     }
+    out.passes_in_turn(passes, Direction::Both, &profile, block);
     Ok(())
 }
 

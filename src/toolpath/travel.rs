@@ -7,6 +7,7 @@
 //!        __________|           |____
 //! ```
 
+use super::emit::AIR_GAIN;
 use crate::geom::{DVec2, DVec3};
 use crate::job::{Job, Operation};
 use crate::stock::Block;
@@ -87,7 +88,7 @@ impl<'a> Travel<'a> {
         let height_mm = self.height_mm(a.truncate(), b.truncate());
         let [up, down] = [a, b].map(|p| rapid_seconds((height_mm - p.z).max(0.0), rate.z, gain.z));
         let level = rapid_seconds(across.length(), rate.x.min(rate.y), gain.x.min(gain.y));
-        let entry = self.job.clearance_mm + GAP_MM / libm::tan(self.job.ramp_rad);
+        let entry = self.job.clearance_mm / AIR_GAIN + GAP_MM / libm::tan(self.job.ramp_rad);
         up + level + down + 60.0 * entry / self.operation.feed_mm_per_min
     }
 }

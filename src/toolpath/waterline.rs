@@ -31,6 +31,9 @@ const ABOVE_GROUND_MM: f64 = 0.002;
 /// finishing cut has been cleared before; how high a wall stands beside the cutter depends on the order of the chains, too.
 const FLANK_PER_DIAMETER: f64 = 1.0;
 
+/// What a level that is left out may leave, as a part of the scallop height: it may come on top of the cusps of others.
+const SPARE: f64 = 0.5;
+
 /// Radius of the arcs on which waterlines are met and left, in diameters.
 const LEAD_PER_DIAMETER: f64 = 0.25;
 
@@ -100,11 +103,12 @@ pub(super) struct Contour {
 }
 
 /// Plans waterlines on all ground that is steep enough, where wood is left, and takes them out of `block`. The levels are
-/// so close that the cusps between them keep to the scallop on the flattest ground that they cross. From one level the
-/// cutter goes down to the next without lifting where that is quicker; such chains of levels are in the order of least
-/// travel, so one may be cut while wood of another still stands above it: no more than roughing has left, whose
-/// thickness sets the feed. On a wall, levels are left out where the flank leaves no more than the limit from the lowest one of
-/// their band; and no part of a chain is cut where nothing is left to take when it begins. The moves go to `out`.
+/// so close that the cusps between them keep to the scallop on the flattest ground that they cross. They are cut from the
+/// bottom up, so that the flank clears walls as far as it can: from one level the cutter goes on to the next without lifting
+/// where that is quicker. Such chains of levels are in the order of least travel; how much wood stands over a level depends on
+/// that, and sets the feed: no more than roughing has left. On a wall, levels are left out where the flank leaves next to nothing
+/// from the lowest one of their band; and no part of a chain is cut where next to nothing is left to take when it begins. The
+/// moves go to `out`.
 pub(super) fn contour(
     site: &Site,
     cut: &Contour,
@@ -145,16 +149,18 @@ pub(super) fn contour(
         let (i, j) = (at.x as usize, at.y as usize);
         i < tip.grid().nx && j < tip.grid().ny && is_steep[j * tip.grid().nx + i]
     };
-    let heights = lines.heights(&cells);
-    let lowest = heights.last().copied().unwrap_or(0.0);
+    // From the bottom up: from the foot of a wall the flank takes what stands above.
+    let mut heights = lines.heights(&cells);
+    heights.reverse();
+    let lowest = heights.first().copied().unwrap_or(0.0);
+    let spare_mm = SPARE * cut.scallop_mm;
     let deep_mm = FLANK_PER_DIAMETER * site.operation.cutter.working_mm();
     let level = |z: f64| {
         // The lowest level of the band.
         let foot = lowest + ((z - lowest) / deep_mm).floor() * deep_mm;
-        let foot = heights.iter().copied().rfind(|h| *h >= foot).unwrap_or(z);
-        let by_flank = |p: DVec2, away: DVec2| {
-            foot < z && cutter.exact.clears(p + away * lines.limit_mm, foot)
-        };
+        let foot = heights.iter().copied().find(|h| *h >= foot).unwrap_or(z);
+        let by_flank =
+            |p: DVec2, away: DVec2| foot < z && cutter.exact.clears(p + away * spare_mm, foot);
         let work = |p: DVec2, away: DVec2| is_steep(p) && !by_flank(p, away);
         lines.spans(&cells, z, &cutter, &work)
     };
@@ -166,22 +172,22 @@ pub(super) fn contour(
     }
     begin_near(&mut levels);
     let (direction, room): (_, &[Side]) = match cut.milling {
-        None => (Direction::Both, &[Side::Left, Side::Right]),
+        None => (Direction::Up, &[Side::Left, Side::Right]),
         Some(Milling::Climb) => (Direction::Fixed, &[Side::Left]),
         Some(Milling::Conventional) => (Direction::Fixed, &[Side::Right]),
     };
-    let way = Way { direction, limit_mm: lines.limit_mm, room };
+    let way = Way { direction, limit_mm: spare_mm, room };
     cutter.ride(site, levels, way, block, out);
     Ok(())
 }
 
-/// Lets each closed line begin near the start of a line of the level above.
+/// Lets each closed line begin near the start of a line of the level before.
 fn begin_near(levels: &mut [Vec<Span>]) {
     for k in 1..levels.len() {
-        let (above, here) = levels.split_at_mut(k);
+        let (before, here) = levels.split_at_mut(k);
         for span in here[0].iter_mut().filter(|span| is_closed(span)) {
             let plan: Vec<DVec2> = span.iter().map(|p| p.truncate()).collect();
-            let starts = above[k - 1].iter().map(|line| line[0].truncate());
+            let starts = before[k - 1].iter().map(|line| line[0].truncate());
             let nearest = starts.map(|start| nearest_vertex(&plan, start));
             if let Some((_, vertex)) = nearest.min_by(|a, b| a.0.total_cmp(&b.0)) {
                 *span = begun_at(std::mem::take(span), vertex);
