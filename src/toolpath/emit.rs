@@ -17,7 +17,8 @@ use rayon::prelude::*;
 use std::collections::VecDeque;
 use std::sync::Arc as Shared;
 
-/// A feed is set by the wood that is met within this distance before and after, mm.
+/// A feed is set by the wood that is met within this distance before and after, mm. Longer ways through air have a feed of
+/// their own: the machine slows down before they end.
 const NEARBY_MM: f64 = 0.5;
 
 /// Ways down that meet no wood go faster than the feed, as thin chips do.
@@ -263,8 +264,12 @@ impl<'a> Emitter<'a> {
         let thickest = most_nearby(moves, |k| f64::from(contacts[k].deepest_mm));
         let chips = most_nearby(moves, |k| f64::from(contacts[k].chip));
         let base = self.operation.feed_mm_per_min;
+        let is_in_air =
+            |k: usize| contacts[k].deepest_mm <= 0.0 && moves[k].length_mm() >= NEARBY_MM;
         let speeds =
-            moves.iter().zip(thickest.iter().zip(&chips)).map(|(m, (&thickness_mm, &chip))| {
+            moves.iter().zip(thickest.iter().zip(&chips)).enumerate().map(|(k, (m, near))| {
+                let (thickness_mm, chip) =
+                    if is_in_air(k) { (0.0, 0.0) } else { (*near.0, *near.1) };
                 let gain = self.operation.feed_limit_mm_per_min(thickness_mm, chip) / base;
                 // Few different speeds: in eighths.
                 let most = base * ((gain * 8.0 + 1e-9).floor() / 8.0).max(0.25);
