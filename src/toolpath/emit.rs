@@ -17,11 +17,10 @@ use rayon::prelude::*;
 use std::collections::VecDeque;
 use std::sync::Arc as Shared;
 
-/// A feed is set by the wood that is met within this distance before and after, mm. Longer ways through air have a feed of
-/// their own: the machine slows down before they end.
+/// A feed is set by the wood that is met within this distance before and after, mm.
 const NEARBY_MM: f64 = 0.5;
 
-/// Ways down that meet no wood go faster than the feed, as thin chips do.
+/// Ways through air, hops and ways down to the wood, go at this many times the feed, as the thinnest chips may.
 pub(super) const AIR_GAIN: f64 = 2.0;
 
 /// The last digit of a program, mm.
@@ -41,6 +40,8 @@ pub(super) struct Emitter<'a> {
     ground: Shared<Ground<'a>>,
     moves: Vec<Move>,
     arcs: Vec<Arc>,
+    /// Where the ramp onto the last chain begins and ends.
+    ramp: Option<[DVec3; 2]>,
     /// Chains left out because they have no room to ramp.
     skipped: usize,
     /// Depth of a pass that is deeper than one should be, mm; else 0.
@@ -65,6 +66,7 @@ impl<'a> Emitter<'a> {
             ground: Shared::new(Ground { slim, leave_mm }),
             moves,
             arcs,
+            ramp: None,
             skipped: 0,
             deepest_pass_mm: 0.0,
             chosen: None,
@@ -161,6 +163,7 @@ impl<'a> Emitter<'a> {
         }
     }
 
+    /// Cuts one chain and takes it out of `block`.
     fn pass(&mut self, chain: &[DVec3], profile: &Profile, block: &mut Block) {
         let first = self.moves.len();
         self.chain(chain, profile, block);
@@ -184,6 +187,7 @@ impl<'a> Emitter<'a> {
         if self.moves.is_empty() {
             self.moves.reserve(chain.len());
         }
+        self.ramp = Some([entry[0], chain[0]].map(on_program_grid));
         let travel = Travel::new(self.job, self.operation, block);
         let mut at = self.go(on_program_grid(entry[0]), wood_mm.max(chain[0].z), profile, &travel);
         for &p in entry.iter().chain(&chain[1..]) {
@@ -244,7 +248,8 @@ impl<'a> Emitter<'a> {
         let first_arc = self.arcs.len();
         fitter.fit(&passes, free, &mut self.moves, &mut self.arcs);
         // Before the passes, so that what a way down meets is not credited to the passes beside it.
-        let is_clear = |m: &Move| is_held_back(m, self.operation) && block.is_clear_of(profile, m);
+        let may_be_clear = |m: &Move| is_held_back(m, self.operation) || is_over(m, block);
+        let is_clear = |m: &Move| may_be_clear(m) && block.is_clear_of(profile, m);
         let clear: Vec<bool> = self.moves[first..].par_iter().map(is_clear).collect();
         let contacts = block.cut(profile, &self.moves[first..]);
         self.settle_feeds(first, first_arc, &contacts, &clear);
@@ -252,7 +257,7 @@ impl<'a> Emitter<'a> {
 
     /// Sets the feeds of the moves from `first` on by the wood that they take (`contacts`, one for each), looking a little
     /// ahead and back: where it is little the cutter goes faster, where it is deep slower. The plunge limit does not hold for
-    /// ways down over carved ground that are `clear` of wood. An arc has one feed.
+    /// ways over carved ground that are `clear` of wood: they go at [`AIR_GAIN`] times the feed. An arc has one feed.
     fn settle_feeds(
         &mut self,
         first: usize,
@@ -264,15 +269,17 @@ impl<'a> Emitter<'a> {
         let thickest = most_nearby(moves, |k| f64::from(contacts[k].deepest_mm));
         let chips = most_nearby(moves, |k| f64::from(contacts[k].chip));
         let base = self.operation.feed_mm_per_min;
-        let is_in_air =
-            |k: usize| contacts[k].deepest_mm <= 0.0 && moves[k].length_mm() >= NEARBY_MM;
+        // What a ramp takes is credited to the cut that follows, which goes deeper: it gains nothing by that.
+        let reached = |p: DVec3| moves.iter().position(|m| m.to == p);
+        let ramp = self.ramp.and_then(|[from, to]| Some(reached(from)? + 1..reached(to)? + 1));
+        let is_ramp = |k: usize| ramp.as_ref().is_some_and(|ramp| ramp.contains(&k));
         let speeds =
             moves.iter().zip(thickest.iter().zip(&chips)).enumerate().map(|(k, (m, near))| {
-                let (thickness_mm, chip) =
-                    if is_in_air(k) { (0.0, 0.0) } else { (*near.0, *near.1) };
+                let (&thickness_mm, &chip) = near;
                 let gain = self.operation.feed_limit_mm_per_min(thickness_mm, chip) / base;
                 // Few different speeds: in eighths.
-                let most = base * ((gain * 8.0 + 1e-9).floor() / 8.0).max(0.25);
+                let gain = ((gain * 8.0 + 1e-9).floor() / 8.0).max(0.25);
+                let most = base * if is_ramp(k) { gain.min(1.0) } else { gain };
                 feed(m.to - m.from, most, self.operation, &self.job.machine)
             });
         let mut speeds: Vec<f64> = speeds.collect();
@@ -325,6 +332,13 @@ impl<'a> Emitter<'a> {
 fn is_held_back(m: &Move, operation: &Operation) -> bool {
     let down = m.from.z - m.to.z;
     !m.is_rapid() && operation.plunge_mm_per_min * m.length_mm() < operation.feed_mm_per_min * down
+}
+
+/// True for a way over carved ground that is long enough for a feed of its own: the machine slows down before it ends.
+fn is_over(m: &Move, block: &Block) -> bool {
+    let middle = m.from.midpoint(m.to);
+    let wood_mm = || block.field().height_at(middle.truncate());
+    !m.is_rapid() && m.length_mm() >= NEARBY_MM && wood_mm().is_some_and(|z| z <= middle.z)
 }
 
 /// Height of the tip at which a cutter that comes straight down over a point touches the wood, mm.

@@ -1,5 +1,6 @@
 //! The order of chains: little travel between the end of one and the start of the next.
 //!
+//! Chains whose cuts overlap may be made to keep their turns: then what each of them meets is the same in any order.
 //! Nearest neighbour first, then 2-opt (Croes 1958) and Or-opt (Or 1976) moves among near neighbours until none
 //! helps or the budget of moves tried is used up. All ties are broken by index, so the order depends on the chains alone.
 
@@ -97,15 +98,15 @@ fn ordered(
 /// Which chains must come before which others. Empty: any order will do.
 #[derive(Clone, Default)]
 struct Turns {
-    /// By chain: chains that come before it, lower ones; what comes before these does, too.
+    /// By chain: chains that come before it, of lower index; what comes before these does, too.
     before: Vec<Vec<usize>>,
     /// By chain: those for which it is one of `before`.
     after: Vec<Vec<usize>>,
 }
 
 impl Turns {
-    /// Of chains that come nearer to each other in plan than `reach_mm` the lower one is first. (So may some be that come
-    /// three times as near.)
+    /// Of chains that come nearer to each other in plan than `reach_mm` the one with the lower index is first; so it may be of
+    /// some that come within some five times of that.
     fn of(chains: &[Vec<DVec3>], reach_mm: f64) -> Self {
         // Points of two ways that come within reach lie within a side of each other.
         let (spacing_mm, side_mm) = (0.5 * reach_mm, 1.5 * reach_mm);
