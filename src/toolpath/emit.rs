@@ -177,7 +177,7 @@ impl<'a> Emitter<'a> {
         let wood_mm = touch_mm(profile, block, chain[0].truncate());
         // Where the cutter meets no wood at the start it goes straight there. Beside a wall that it has cut itself it meets none,
         // but touches the slope that a grid makes of the wall.
-        let met_mm = meets_mm(profile, block, chain[0].truncate());
+        let met_mm = meets_mm(profile, block, on_program_grid(chain[0]).truncate());
         let ramp_z = if met_mm > chain[0].z { met_mm + ramp_gap_mm(met_mm) } else { chain[0].z };
         let ramp_z = ramp_z.min(safe_z_mm.max(chain[0].z));
         let Some(entry) = ramp_onto(chain, ramp_z, libm::tan(self.job.ramp_rad)) else {
