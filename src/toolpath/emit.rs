@@ -175,10 +175,8 @@ impl<'a> Emitter<'a> {
     fn chain(&mut self, chain: &[DVec3], profile: &Profile, block: &Block) {
         let safe_z_mm = self.job.safe_z_mm;
         let wood_mm = touch_mm(profile, block, chain[0].truncate());
-        // Where the cutter meets no wood at the start it goes straight there. Beside a wall that it has cut itself it meets none,
-        // but touches the slope that a grid makes of the wall.
-        let met_mm = meets_mm(profile, block, on_program_grid(chain[0]).truncate());
-        let ramp_z = if met_mm > chain[0].z { met_mm + ramp_gap_mm(met_mm) } else { chain[0].z };
+        // Where the cutter touches no wood at the start it goes straight there.
+        let ramp_z = if wood_mm > chain[0].z { wood_mm + ramp_gap_mm(wood_mm) } else { chain[0].z };
         let ramp_z = ramp_z.min(safe_z_mm.max(chain[0].z));
         let Some(entry) = ramp_onto(chain, ramp_z, libm::tan(self.job.ramp_rad)) else {
             self.skipped += 1;
@@ -345,17 +343,6 @@ fn is_over(m: &Move, block: &Block) -> bool {
 fn touch_mm(profile: &Profile, block: &Block, p: DVec2) -> f64 {
     let wood = block.field().near(p, profile.radius_mm());
     wood.map_or(f64::NEG_INFINITY, |wood| Dropper::new(&wood, profile.clone()).drop(p))
-}
-
-/// Height of the tip at which a cutter that comes straight down over a point meets wood at a node, mm.
-fn meets_mm(profile: &Profile, block: &Block, p: DVec2) -> f64 {
-    let Some(wood) = block.field().near(p, profile.radius_mm()) else { return f64::NEG_INFINITY };
-    let grid = wood.grid();
-    let nodes = wood.z().iter().enumerate().filter_map(|(k, z)| {
-        let away_mm = grid.node(k % grid.nx, k / grid.nx).distance(p);
-        Some(f64::from(*z) - profile.height_at(away_mm)?)
-    });
-    nodes.fold(f64::NEG_INFINITY, f64::max)
 }
 
 /// The largest of a figure (by index) for each move and the moves within [`NEARBY_MM`] of way before and after it.
