@@ -32,6 +32,7 @@ mod rough;
 mod rows;
 mod thin;
 mod trace;
+mod trail;
 mod travel;
 mod waterline;
 

@@ -6,6 +6,7 @@ use super::hop::{Ground, hop};
 use super::order::{Direction, in_order, in_turn};
 use super::ramp::ramp_onto;
 use super::trace::{DROP_MM, LEAST_ROUNDING_MM};
+use super::trail::Trail;
 use super::travel::{CARVED_MM, Travel, ramp_gap_mm};
 use crate::cutter::Profile;
 use crate::geom::{DVec2, DVec3, Move, MoveKind};
@@ -40,6 +41,8 @@ pub(super) struct Emitter<'a> {
     ground: Shared<Ground<'a>>,
     moves: Vec<Move>,
     arcs: Vec<Arc>,
+    /// Where the tip has been on `moves`.
+    trail: Trail,
     /// Where the ramp onto the last chain begins and ends.
     ramp: Option<[DVec3; 2]>,
     /// Chains left out because they have no room to ramp.
@@ -66,6 +69,7 @@ impl<'a> Emitter<'a> {
             ground: Shared::new(Ground { slim, leave_mm }),
             moves,
             arcs,
+            trail: Trail::default(),
             ramp: None,
             skipped: 0,
             deepest_pass_mm: 0.0,
@@ -175,8 +179,7 @@ impl<'a> Emitter<'a> {
     fn chain(&mut self, chain: &[DVec3], profile: &Profile, block: &Block) {
         let safe_z_mm = self.job.safe_z_mm;
         let wood_mm = touch_mm(profile, block, chain[0].truncate());
-        // Where the cutter touches no wood at the start it goes straight there.
-        let ramp_z = if wood_mm > chain[0].z { wood_mm + ramp_gap_mm(wood_mm) } else { chain[0].z };
+        let ramp_z = self.clear_mm(chain[0], wood_mm, profile, block);
         let ramp_z = ramp_z.min(safe_z_mm.max(chain[0].z));
         let Some(entry) = ramp_onto(chain, ramp_z, libm::tan(self.job.ramp_rad)) else {
             self.skipped += 1;
@@ -195,6 +198,21 @@ impl<'a> Emitter<'a> {
                 at = self.feed(at, to);
             }
         }
+    }
+
+    /// Height over the start of a chain from which the cutter ramps, mm; its own where it goes straight there. Beside a wall that
+    /// it has cut itself it touches the slope that a grid makes of the wall (`touch_mm`), but where it has stood there is no
+    /// wood.
+    fn clear_mm(&mut self, start: DVec3, touch_mm: f64, profile: &Profile, block: &Block) -> f64 {
+        let mut clear_mm = touch_mm;
+        if touch_mm > start.z {
+            let p = on_program_grid(start).truncate();
+            let stood_mm = self.trail.lowest_mm(&self.moves, p);
+            if stood_mm < touch_mm {
+                clear_mm = touch_mm.min(stood_mm.max(meets_mm(profile, block, p)));
+            }
+        }
+        if clear_mm > start.z { clear_mm + ramp_gap_mm(clear_mm) } else { start.z }
     }
 
     /// Goes to `to`, over wood that the cutter there would touch at height `touch_mm`, and says where the tip is then: there
@@ -238,6 +256,7 @@ impl<'a> Emitter<'a> {
     /// Done with a set of passes, whose moves begin at `first`: makes arcs of them where that saves lines, takes them out of
     /// `block`, and sets their feeds by the wood that they meet.
     pub(super) fn cut(&mut self, first: usize, profile: &Profile, block: &mut Block) {
+        self.trail.forget_from(first);
         let passes = self.moves.split_off(first);
         let stock = self.job.stock.bounds();
         let ground = &self.ground;
@@ -289,12 +308,15 @@ impl<'a> Emitter<'a> {
             }
         }
         if first > 0 && !self.moves[first - 1].is_rapid() {
-            // What goes on from the end of a cut may be said to meet the wood of that: there it is not faster than usual.
+            // What goes on from the end of a cut may be said to meet the wood of that: there it is not faster than usual
+            // (unless it was found to meet none).
             let starts = moves
                 .iter()
                 .scan(0.0, |way_mm, m| Some(std::mem::replace(way_mm, *way_mm + m.length_mm())));
             let near = starts.take_while(|s| *s <= NEARBY_MM);
-            for (speed, _) in speeds.iter_mut().zip(near) {
+            for ((speed, _), _) in
+                speeds.iter_mut().zip(near).zip(clear).filter(|(_, clear)| !**clear)
+            {
                 *speed = speed.min(base);
             }
         }
@@ -343,6 +365,17 @@ fn is_over(m: &Move, block: &Block) -> bool {
 fn touch_mm(profile: &Profile, block: &Block, p: DVec2) -> f64 {
     let wood = block.field().near(p, profile.radius_mm());
     wood.map_or(f64::NEG_INFINITY, |wood| Dropper::new(&wood, profile.clone()).drop(p))
+}
+
+/// Height of the tip at which a cutter that comes straight down over a point meets wood at a node, mm.
+fn meets_mm(profile: &Profile, block: &Block, p: DVec2) -> f64 {
+    let Some(wood) = block.field().near(p, profile.radius_mm()) else { return f64::NEG_INFINITY };
+    let grid = wood.grid();
+    let nodes = wood.z().iter().enumerate().filter_map(|(k, z)| {
+        let away_mm = grid.node(k % grid.nx, k / grid.nx).distance(p);
+        Some(f64::from(*z) - profile.height_at(away_mm)?)
+    });
+    nodes.fold(f64::NEG_INFINITY, f64::max)
 }
 
 /// The largest of a figure (by index) for each move and the moves within [`NEARBY_MM`] of way before and after it.

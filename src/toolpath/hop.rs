@@ -33,6 +33,8 @@ const GROUND_GAP_MM: f64 = 0.1;
 
 /// Distance of the places at which a hop is looked at, mm.
 const LOOK_MM: f64 = 0.05;
+/// The same where the ground is near, mm.
+const CLOSE_LOOK_MM: f64 = 0.001;
 
 /// What an operation has to keep off.
 pub(super) struct Ground<'a> {
@@ -51,6 +53,16 @@ impl Ground<'_> {
     /// True where the tip may be.
     pub(super) fn is_free(&self, p: DVec3) -> bool {
         self.slim.clears(p.truncate(), p.z + DROP_MM - self.leave_mm)
+    }
+
+    /// True where the tip may go straight from `a` to `b`: at both ends of each piece, as low as the lower one.
+    fn is_leg_free(&self, a: DVec3, b: DVec3) -> bool {
+        let (length_mm, low_mm) = (a.distance(b), a.z.min(b.z));
+        if length_mm <= LOOK_MM && [a, b].iter().all(|p| self.is_free(p.with_z(low_mm))) {
+            return true;
+        }
+        let middle = a.midpoint(b);
+        length_mm > CLOSE_LOOK_MM && self.is_leg_free(a, middle) && self.is_leg_free(middle, b)
     }
 }
 
@@ -95,13 +107,9 @@ pub(super) fn hop(
     let way = taut(from, to, &heights);
     let lowest_mm = way.iter().map(|p| p.z).fold(from.z.min(to.z), f64::min);
     let points: Vec<DVec3> = [from].into_iter().chain(way.iter().copied()).chain([to]).collect();
-    let is_free = |leg: &[DVec3]| {
-        let looks = (leg[0].distance(leg[1]) / LOOK_MM).ceil() as usize;
-        (1..looks).all(|k| ground.is_free(leg[0].lerp(leg[1], k as f64 / looks as f64)))
-    };
     (motion::seconds(&feeds(&points), machine) < lift_s
         && travel.shank_passes(a, b, lowest_mm)
-        && points.windows(2).all(is_free))
+        && points.windows(2).all(|leg| ground.is_leg_free(leg[0], leg[1])))
     .then_some(way)
 }
 

@@ -360,19 +360,21 @@ fn height_on(path: &[Sample], s: f64) -> f64 {
     a.z + (b.z - a.z) * ((s - a.s) / (b.s - a.s))
 }
 
-/// Rapids down and straight plunges end above the wood; the first sloping piece after them is no steeper than
+/// Rapids down and straight plunges end above the wood, or where the cutter has been (between nodes the wood may be lower than
+/// a straight line from one to the next); the first sloping piece after them is no steeper than
 /// the ramp. (The whole descent is tested where it is made.)
 fn assert_entries_are_ramped(path: &Toolpath, job: &Job, wood: &mut Heightfield) {
     let slope = libm::tan(job.ramp_rad);
     let profile = Profile::of(&path.cutter);
     let mut entering = false;
-    for m in &path.moves {
+    for (k, m) in path.moves.iter().enumerate() {
         if m.is_rapid() {
             entering = true;
             assert!(!gouges(wood, &profile, m.to, 0.0), "rapid into wood at {}", m.to);
         } else if m.from.truncate() == m.to.truncate() && m.to.z < m.from.z {
             // After a rapid, or at the end of a hop.
-            assert!(!gouges(wood, &profile, m.to, 0.0), "straight down at {}", m.to);
+            let has_stood = || path.moves[..k].iter().any(|m0| passes_over(m0, m.to));
+            assert!(!gouges(wood, &profile, m.to, 0.0) || has_stood(), "straight down at {}", m.to);
             entering = true;
         } else if entering {
             let down = m.from.z - m.to.z;
@@ -382,6 +384,14 @@ fn assert_entries_are_ramped(path: &Toolpath, job: &Job, wood: &mut Heightfield)
         }
         lower(wood, &profile, m);
     }
+}
+
+/// True when a move comes by a point in plan, by no more than the rounding of the program, and no higher.
+fn passes_over(m: &Move, p: DVec3) -> bool {
+    let places = (m.length_mm() / 0.0005).ceil().max(1.0);
+    (0..=places as usize)
+        .map(|k| m.from.lerp(m.to, k as f64 / places))
+        .any(|at| at.truncate().distance(p.truncate()) <= 0.0025 && at.z <= p.z + 1e-9)
 }
 
 /// Takes a move out of the wood by stamping. Between stamps nodes at the very rim of the sweep would stay, up to the sagitta
