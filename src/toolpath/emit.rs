@@ -452,3 +452,6 @@ pub(super) fn feed_seconds(site: &Site, points: &[DVec3]) -> f64 {
     };
     60.0 * points.windows(2).map(minutes).sum::<f64>()
 }
+
+#[cfg(test)]
+mod tests;
