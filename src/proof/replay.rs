@@ -259,23 +259,34 @@ impl Case<'_> {
             .filter(|&nearest| off(nearest) > RPM_SLACK)
     }
 
-    /// Removes the program's moves from the block.
-    ///
-    /// Moves whose own contact matters are carved alone: those that go down or along too fast, those beside an event and,
-    /// where the wood is deeper than the flutes are long, all of them.
+    /// Removes the program's moves from the block. Where the wood is deeper than the flutes are long, each move's height in
+    /// it counts with all that it meets itself.
     fn carve(&mut self, block: &mut Block, lowest_mm: f64) -> Vec<Contact> {
-        let moves = &self.program.moves;
         let cutter = &self.part.cutter;
         let profile = Profile::of(cutter);
         let depth_mm = -lowest_mm;
-        if depth_mm > cutter.stickout_mm
-            || (depth_mm > cutter.flute_mm && cutter.shank_mm > cutter.diameter_mm)
-        {
-            return self.carve_with_shank(block, &profile);
+        let is_deep = depth_mm > cutter.flute_mm;
+        let with_shank =
+            depth_mm > cutter.stickout_mm || (is_deep && cutter.shank_mm > cutter.diameter_mm);
+        let own = if with_shank {
+            self.carve_with_shank(&mut block.clone(), &profile)
+        } else if is_deep {
+            block.clone().cut_alone(&profile, &self.program.moves, |_| true)
+        } else {
+            Vec::new()
+        };
+        let mut contacts = self.carve_chains(block, &profile);
+        for (contact, own) in contacts.iter_mut().zip(own) {
+            contact.engaged_mm = contact.engaged_mm.max(own.engaged_mm);
         }
-        let every = depth_mm > cutter.flute_mm;
-        let mut alone: Vec<bool> =
-            moves.iter().map(|m| every || self.plunges(m) || self.races(m)).collect();
+        contacts
+    }
+
+    /// As [`Case::carve`], with credits as in the planner, which sets feeds by them. Alone are carved moves whose own contact
+    /// matters: those that go down or along too fast, and those beside an event.
+    fn carve_chains(&mut self, block: &mut Block, profile: &Profile) -> Vec<Contact> {
+        let moves = &self.program.moves;
+        let mut alone: Vec<bool> = moves.iter().map(|m| self.plunges(m) || self.races(m)).collect();
         for e in &self.program.events {
             for k in [e.at_move.wrapping_sub(1), e.at_move] {
                 if let Some(flag) = alone.get_mut(k) {
@@ -287,7 +298,7 @@ impl Case<'_> {
         let mut contacts = Vec::with_capacity(moves.len());
         for next in low.into_iter().chain([moves.len()]) {
             let first = contacts.len();
-            contacts.extend(block.cut_alone(&profile, &moves[first..next], |k| alone[first + k]));
+            contacts.extend(block.cut_alone(profile, &moves[first..next], |k| alone[first + k]));
             if let Some(m) = moves.get(next) {
                 self.check_low_rapid(block, m);
             }
@@ -331,9 +342,6 @@ impl Case<'_> {
         ];
         let mut contacts = Vec::with_capacity(self.program.moves.len());
         for m in &self.program.moves {
-            if self.travels_low(m) {
-                self.check_low_rapid(block, m);
-            }
             let n = (m.length_mm() / piece_mm).ceil().max(1.0);
             let mut contact = Contact::default();
             let mut from = m.from;

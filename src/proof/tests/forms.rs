@@ -50,6 +50,17 @@ fn prove_after_roughing(finishing: Operation, bumps: &[Bump]) -> Leftover {
     verdict.leftover
 }
 
+/// How feeds are judged does not hang on how long the flutes are, nor on the shank.
+#[test]
+fn a_job_deeper_than_the_flutes_is_judged_like_others() {
+    for shank_mm in [2.0, 3.0] {
+        let mut ball = cutter(CutterShape::Ball, 2.0);
+        (ball.flute_mm, ball.shank_mm) = (2.9, shank_mm);
+        let left = prove_after_roughing(finish(ball, 0.01), &hills()[..1]);
+        assert!(left.over_fraction == 0.0, "{left:?}");
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig { cases: 12, ..ProptestConfig::default() })]
 
