@@ -49,6 +49,27 @@ impl Default for Tolerance {
     }
 }
 
+impl Tolerance {
+    /// Part of `gouge_mm` that finishing may leave above the cusps before more passes are worth it.
+    const SPARE: f64 = 0.75;
+    /// And the part that it must be left, to end.
+    const LEAST_SPARE: f64 = 0.25;
+
+    /// Height that finishing with cusps of `scallop_mm` may leave, mm normal to the target: less than
+    /// `self.scallop_mm + gouge_mm` wherever [`Tolerance::allows`] these cusps.
+    pub fn left_by_mm(&self, scallop_mm: f64) -> f64 {
+        let cusps_mm =
+            if self.allows(scallop_mm) { scallop_mm.min(self.scallop_mm) } else { scallop_mm };
+        cusps_mm + Self::SPARE * self.gouge_mm
+    }
+
+    /// True where finishing with cusps of `scallop_mm` can leave less than `self.scallop_mm + gouge_mm`.
+    pub fn allows(&self, scallop_mm: f64) -> bool {
+        let most_mm = self.scallop_mm + (Self::SPARE - Self::LEAST_SPARE) * self.gouge_mm;
+        scallop_mm <= most_mm + 1e-9
+    }
+}
+
 /// An axis-parallel box in the plane, mm. Empty until a point is added.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bounds {
@@ -109,5 +130,28 @@ impl Bounds {
     /// True when `p` lies inside or on the rim.
     pub fn contains(&self, p: DVec2) -> bool {
         p.cmpge(self.min).all() && p.cmple(self.max).all()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        /// Allowed cusps fit under what may be left, with room above them, and that under what the proof lets pass. Others
+        /// would not.
+        #[test]
+        fn what_finishing_leaves_lies_between_its_cusps_and_the_proof(
+            scallop_mm in 0.001..0.1_f64, gouge_mm in 0.006..0.1_f64, cusps_mm in 0.001..0.3_f64,
+        ) {
+            let tolerance = Tolerance { gouge_mm, scallop_mm, ..Tolerance::default() };
+            let left_mm = tolerance.left_by_mm(cusps_mm);
+            prop_assert!(left_mm >= cusps_mm + 0.2 * gouge_mm);
+            let proof_mm = scallop_mm + gouge_mm;
+            prop_assert_eq!(left_mm < proof_mm, tolerance.allows(cusps_mm));
+            prop_assert!(!tolerance.allows(cusps_mm) || left_mm <= proof_mm - 0.2 * gouge_mm);
+            prop_assert!(tolerance.allows(scallop_mm));
+        }
     }
 }

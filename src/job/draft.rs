@@ -12,7 +12,7 @@ use super::keys::{
 };
 use super::layer::{LayerDraft, read_layer};
 use super::library::{Library, read_machine, read_machine_file, read_wood};
-use super::operation::{OperationDraft, default_operations, read_operation};
+use super::operation::{KindDraft, OperationDraft, default_operations, read_operation};
 use super::reader::{Table, as_number};
 use super::selector::read_color;
 use super::types::{
@@ -138,13 +138,19 @@ fn read(
     let machine = read_machine_choice(top, library, load)?;
     let stock = or_empty("stock", &STOCK)?;
     let relief = or_empty("relief", &RELIEF)?;
-    let tolerance = read_tolerance(&or_empty("tolerance", &TOLERANCE)?)?;
+    let tolerance = or_empty("tolerance", &TOLERANCE)?;
     let safety = or_empty("safety", &SAFETY)?;
     let layers = top.tables("layer", &LAYER)?;
     let groups = top.tables("group", &GROUP)?;
     let operations = top.tables("operation", &OPERATION)?;
     let keep_outs = top.tables("keep_out", &KEEP_OUT)?;
     let picture = artwork.is_picture();
+    let operations = if operations.is_empty() {
+        default_operations(top.source, library)?
+    } else {
+        let operations = operations.iter().map(|table| read_operation(table, library));
+        operations.collect::<Result<_, _>>()?
+    };
     let draft = Draft {
         source: Source::default(),
         notes: Vec::new(),
@@ -163,7 +169,7 @@ fn read(
         pitch_mm: relief.number("pitch_mm"),
         depth_mm: relief.sure_number("depth_mm"),
         background: read_background(&relief)?,
-        tolerance,
+        tolerance: read_tolerance(&tolerance, &operations)?,
         safe_z_mm: safety.sure_number("safe_z_mm"),
         clearance_mm: safety.sure_number("clearance_mm"),
         ramp_rad: safety.sure_number("ramp_deg").to_radians(),
@@ -180,14 +186,7 @@ fn read(
             .collect(),
         layers: layers.iter().map(|table| read_layer(table, picture)).collect::<Result<_, _>>()?,
         groups: read_groups(&groups, &layers)?,
-        operations: if operations.is_empty() {
-            default_operations(top.source, library)?
-        } else {
-            operations
-                .iter()
-                .map(|table| read_operation(table, library))
-                .collect::<Result<_, _>>()?
-        },
+        operations,
     };
     if draft.clearance_mm > draft.safe_z_mm {
         let message =
@@ -423,12 +422,15 @@ fn read_background(relief: &Table<'_>) -> Result<BackgroundDraft, JobError> {
     }
 }
 
-fn read_tolerance(table: &Table<'_>) -> Result<Tolerance, JobError> {
+/// The cusps that may be left are those of the last finishing, where nothing else is said.
+fn read_tolerance(table: &Table<'_>, operations: &[OperationDraft]) -> Result<Tolerance, JobError> {
+    let finish = operations.iter().rfind(|o| o.kind == KindDraft::Finish);
+    let own = finish.and_then(|o| o.scallop_mm).filter(|_| table.raw("scallop_mm").is_none());
     let tolerance = Tolerance {
         chord_mm: table.sure_number("chord_mm"),
         fit_mm: table.sure_number("fit_mm"),
         gouge_mm: table.sure_number("gouge_mm"),
-        scallop_mm: table.sure_number("scallop_mm"),
+        scallop_mm: own.unwrap_or_else(|| table.sure_number("scallop_mm")),
     };
     // The sum of decimals is compared with a slack of a nanometre.
     if tolerance.fit_mm + rule::BUDGET_MM > tolerance.gouge_mm + 1e-6 {

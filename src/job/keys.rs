@@ -555,7 +555,7 @@ pub(super) static TOLERANCE: Section = Section {
             "scallop_mm",
             mm(0.0005, 1.0),
             Number(0.01),
-            "height of the cusps between finishing passes",
+            "height of the cusps between finishing passes; not given, that of the last finish operation",
         ),
     ],
 };

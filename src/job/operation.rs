@@ -14,6 +14,7 @@ use super::types::{
     CutterShape, CutterSpec, Follow, LayerSpec, Milling, Operation, OperationKind, Pattern,
     Stepover, Stock, Within,
 };
+use crate::geom::Tolerance;
 
 /// An operation whose numbers may still be open.
 #[derive(Debug, Clone, PartialEq)]
@@ -389,7 +390,7 @@ impl Step<'_> {
                 milling: draft.milling,
             },
             KindDraft::Finish => OperationKind::Finish {
-                scallop_mm: self.scallop_mm()?,
+                scallop_mm: self.last_scallop_mm()?,
                 follow: draft.follow,
                 angle_rad,
             },
@@ -441,6 +442,23 @@ impl Step<'_> {
             return Ok(Stepover::Plan(round(rule::FLAT_STEPOVER * cutter.diameter_mm)));
         }
         Ok(Stepover::Scallop(self.scallop_mm()?))
+    }
+
+    /// The cusps of a finishing. Those of the last one stay, and strict jobs refuse too high ones.
+    fn last_scallop_mm(&self) -> Result<f64, JobError> {
+        let scallop_mm = self.scallop_mm()?;
+        let later = &self.job.operations[self.index + 1..];
+        let is_last = later.iter().all(|o| o.kind != KindDraft::Finish);
+        let Tolerance { scallop_mm: wanted_mm, gouge_mm, .. } = self.job.tolerance;
+        if self.job.strict && is_last && !self.job.tolerance.allows(scallop_mm) {
+            let message = format!(
+                "cusps of {scallop_mm} mm leave more than strict = true lets pass, tolerance.scallop_mm {wanted_mm} \
+                 and gouge_mm {gouge_mm} together"
+            );
+            let help = "give the cusps that you want here alone, and no tolerance.scallop_mm";
+            return self.refuse(&["scallop_mm"], &message, help);
+        }
+        Ok(scallop_mm)
     }
 
     fn scallop_mm(&self) -> Result<f64, JobError> {

@@ -174,6 +174,22 @@ fn the_whole_example_is_read() {
     assert_eq!(job.operations[1].kind, raster);
 }
 
+/// The cusps that may be left are those of the last finishing, unless the job says something else.
+#[test]
+fn the_scallop_tolerance_follows_the_finishing() {
+    let left_mm = |tolerance: &str, cusps: &[&str]| {
+        let finish = |line: &&str| format!("[[operation]]\nkind = \"finish\"\n{line}\n");
+        let operations: String = cusps.iter().map(finish).collect();
+        let text = format!("[artwork]\nfile = \"a.svg\"\n{tolerance}\n{operations}");
+        draft(&text).unwrap().tolerance().scallop_mm
+    };
+    assert_eq!(left_mm("", &["scallop_mm = 0.015"]), 0.015);
+    assert_eq!(left_mm("", &["scallop_mm = 0.1", ""]), 0.01);
+    assert_eq!(left_mm("", &["", "scallop_mm = 0.03"]), 0.03);
+    assert_eq!(left_mm("[tolerance]\nscallop_mm = 0.02", &["scallop_mm = 0.03"]), 0.02);
+    assert_eq!(left_mm("[tolerance]\ngouge_mm = 0.02", &[]), 0.01);
+}
+
 #[test]
 fn defaults_are_those_of_the_product() {
     let job = Draft::for_artwork("art/lotus.svg", &Library::built_in()).settle(&found()).unwrap();

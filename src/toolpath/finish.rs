@@ -37,9 +37,6 @@ const TURNS: [(f64, f64); 6] = [
 ];
 /// Ground steeper than this is finished along its contours first in any case.
 const STEEP_RAD: f64 = FRAC_PI_4;
-/// Part of `gouge_mm` that may be left above the scallop height before more passes are worth it.
-const SPARE: f64 = 0.75;
-
 /// The first passes climb walls, which are finished, no further than this, in stepovers; what they miss by that is for the
 /// passes that follow.
 const CLIMB: f64 = 0.25;
@@ -65,7 +62,7 @@ pub(super) fn finish(
     let Finish { scallop_mm, angle_rad, outlines, is_free } = *cut;
     let stepover_mm = site.stepover_of(scallop_mm)?;
     clear_deep_wood(site, angle_rad, block, out)?;
-    let limit_mm = scallop_mm + SPARE * site.job.tolerance.gouge_mm;
+    let limit_mm = site.job.tolerance.left_by_mm(scallop_mm);
     // Where parallel passes could leave more than the limit: cusps grow by 1 / cos^2 of a slope across them.
     let steeper_than_rad = libm::acos((scallop_mm / limit_mm).sqrt()).min(STEEP_RAD);
     let profile = Profile::of(&site.operation.cutter);

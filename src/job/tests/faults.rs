@@ -279,6 +279,12 @@ fn operations_that_cannot_be_done_are_refused() {
         (6, 14),
         &["leaves no cusps"],
     );
+    // What the job itself asks for can't be held.
+    let finish = "[[operation]]\nkind = \"finish\"\nscallop_mm = 0.03\n";
+    let strict = format!(
+        "strict = true\n[artwork]\nfile = \"a.svg\"\n[tolerance]\nscallop_mm = 0.02\n{finish}"
+    );
+    refused(&strict, kind, (8, 14), &["tolerance.scallop_mm 0.02", "strict = true"]);
     refused(&operation("kind = \"rough\"\nstepover_mm = 6.1"), kind, (5, 15), &["leave ribs"]);
     refused(
         &operation("kind = \"rough\"\nstepdown_mm = 30"),

@@ -50,6 +50,13 @@ fn prove_after_roughing(finishing: Operation, bumps: &[Bump]) -> Leftover {
     verdict.leftover
 }
 
+/// Cusps a little higher than the tolerance: what finishing may leave above them shrinks.
+#[test]
+fn cusps_above_the_tolerance_leave_less_beside_them() {
+    let left = prove_after_roughing(finish(cutter(CutterShape::Ball, 2.0), 0.015), &hills());
+    assert!(left.over_fraction == 0.0, "{left:?}");
+}
+
 /// How feeds are judged does not hang on how long the flutes are, nor on the shank.
 #[test]
 fn a_job_deeper_than_the_flutes_is_judged_like_others() {
