@@ -37,6 +37,7 @@ const TURNS: [(f64, f64); 6] = [
 ];
 /// Ground steeper than this is finished along its contours first in any case.
 const STEEP_RAD: f64 = FRAC_PI_4;
+
 /// The first passes climb walls, which are finished, no further than this, in stepovers; what they miss by that is for the
 /// passes that follow.
 const CLIMB: f64 = 0.25;

@@ -53,8 +53,15 @@ fn prove_after_roughing(finishing: Operation, bumps: &[Bump]) -> Leftover {
 /// Cusps a little higher than the tolerance: what finishing may leave above them shrinks.
 #[test]
 fn cusps_above_the_tolerance_leave_less_beside_them() {
-    let left = prove_after_roughing(finish(cutter(CutterShape::Ball, 2.0), 0.015), &hills());
-    assert!(left.over_fraction == 0.0, "{left:?}");
+    let dome =
+        |radius_mm| Bump { at: DVec2::new(6.0, 4.5), radius_mm, height_mm: 2.5, wall: false };
+    for diameter_mm in [1.5, 2.0, 3.0] {
+        for radius_mm in [1.5, 2.0, 2.5, 3.0] {
+            let ball = cutter(CutterShape::Ball, diameter_mm);
+            let left = prove_after_roughing(finish(ball, 0.015), &[dome(radius_mm)]);
+            assert!(left.over_fraction == 0.0, "{diameter_mm} {radius_mm}: {left:?}");
+        }
+    }
 }
 
 /// How feeds are judged does not hang on how long the flutes are, nor on the shank.
