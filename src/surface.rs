@@ -27,6 +27,7 @@ mod ridge;
 mod rim;
 mod ruled;
 mod rungs;
+mod scan;
 mod subdivide;
 mod weld;
 
@@ -38,7 +39,7 @@ pub use drawn::{
     drawn_surface, levels,
 };
 pub use edits::{EditFault, Refined, draw_to};
-pub use fields::{Rise, r_function, scan_lines};
+pub use fields::{Rise, r_function};
 pub use halfplanes::{r_conjunction, r_disjunction};
 pub use inscribed::inscribed_radius;
 pub use inside::inside_spans;
@@ -53,6 +54,7 @@ pub use ratio::{
 pub use ridge::{Heights, Ridge};
 pub use ruled::{Density, RuledFault, check as check_ruled, mesh as ruled_mesh};
 pub use rungs::{Rungs, rungs};
+pub use scan::scan_lines;
 pub use subdivide::{
     ClosedForm, CoonsMesh, CoonsRules, CreasedMesh, Edit, EditError, EditRules, Edited,
     EvaluateError, Handle, IsoFault, LimitRows, LimitSurface, MOST_FACES, Method, PolyMesh, SHARP,

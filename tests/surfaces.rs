@@ -15,28 +15,22 @@ use shapes::Ladder;
 
 /// A figure counts as reproduced when it is off by no more than this part.
 const WITHIN: f64 = 0.2;
-/// Half of the last digit of the tabled errors.
+/// Half of the last digit of the tabled errors, and of the tabled ridge errors.
 const DIGIT: f64 = 5e-5;
+const RIDGE_DIGIT: f64 = 5e-4;
 
 /// Figures above the tabled ones by more than that: method, figure by its place in the row, and how high it may be.
 ///
-/// *Subdivision on the plus*: the figure is taken over the arms from 1.5 to 2.5; the table does not say over which part,
-/// and all of that lies within two control triangles of a pole or the junction, where the scheme is not regular.
-/// *Ridge of A+, jump of A*: a quarter above the table; the highest points agree, so it is where they lie. Shapes made of
-/// rectangles have ties in their triangulation, which may explain it.
-/// *Harmonic*: the ridge is off between nodes only; the plate energy is that of the cones at the ends of the spine.
-/// *Scan lines*: outlines with sixteen times the points run closer to the horizontal; C2's ridge is broken where no
-/// chord qualifies, and how far depends on where the lines fall.
-const WORSE: [(&str, usize, f64); 8] = [
-    ("A+ butterfly", 3, 0.096),
-    ("A+ butterfly", 4, 0.107),
-    ("Harmonic", 4, 0.005),
-    ("Harmonic", 7, 27.0),
-    ("C1 literal", 6, 29.0),
-    ("C1 literal", 7, 11000.0),
-    ("C2, 8 directions, parabola", 4, 0.092),
-    ("C2, 8 directions, parabola", 8, 11.0),
-];
+/// *Subdivision on even rungs*: over an arm of the plus two steps of the control mesh fit, so all of it lies within two
+/// control triangles of a pole or the junction, where the scheme is not regular: with one step more the error is .038. The
+/// highest points agree, so the ridge is as wrong as tabled at its worst.
+/// *Harmonic*: the table's field has the full height at all nodes within 0.71 cells of the spine, hence no error there; ours
+/// has it on the spine itself, and falls off between its nodes.
+const WORSE: [(&str, usize, f64); 3] =
+    [("A+ butterfly", 3, 0.093), ("A+ butterfly", 4, 0.106), ("Harmonic", 4, 0.005)];
+/// Slopes below the tabled ones by more than that. Of Teddy's surface the heights are spread between the branches of the
+/// spine without steps; a table of a surface that has some says a slope of 6.74, and six times our plate energy.
+const GENTLER: [(&str, f64); 1] = [("T Teddy ellipse", 4.6)];
 /// Rows of literal patches over a triangle are parallel to its side with the lowest vertex; which that is, the table does
 /// not say. So it is here only that one crease is wider than tabled.
 const WORSE_CREASE: (&str, &str, f64) = ("B literal", "tee", 38.5);
@@ -64,10 +58,13 @@ fn surfaces_are_as_true_and_as_smooth_as_tabled() {
                 let Some(tabled) = tabled else { continue };
                 let name = method.name();
                 let worse = WORSE.iter().find(|w| w.0 == name && w.1 == k).map(|w| w.2);
-                let most = worse.unwrap_or(tabled * (1.0 + WITHIN) + DIGIT);
+                let digit = if k == 4 { RIDGE_DIGIT } else { DIGIT };
+                let most = worse.unwrap_or(tabled * (1.0 + WITHIN) + digit);
                 assert!(got[k] <= most, "{outline:?} {name} figure {k}: {} / {tabled}", got[k]);
                 // The highest point and the slope are no errors: less is not better.
+                let gentler = GENTLER.iter().find(|g| g.0 == name && k == 6).map(|g| g.1);
                 let least = if k == 5 || k == 6 { tabled * (1.0 - WITHIN) } else { 0.0 };
+                let least = gentler.unwrap_or(least);
                 assert!(got[k] >= least, "{outline:?} {name} figure {k}: {}", got[k]);
             }
         }

@@ -1,7 +1,7 @@
 //! Heights at the nodes of a grid -> figures of merit: errors, ridge, slope, plate energy, jumps.
 //!
-//! Second differences, slopes and normals are those of single cells, so that all figures belong to the pitch of the
-//! grid: compare only what was measured on the same one.
+//! Second differences and normals are those of single cells, and slopes central differences at nodes, so that all figures
+//! belong to the pitch of the grid: compare only what was measured on the same one.
 
 use crate::geom::{DVec2, DVec3, Grid};
 use crate::surface::Patch;
@@ -16,9 +16,9 @@ pub struct Measures {
     pub ridge: Option<[f64; 2]>,
     /// Highest point, mm.
     pub highest: f64,
-    /// 99.9th percentile of the slopes, rise over run.
+    /// 99.9th percentile of the slopes at nodes, by central differences, rise over run.
     pub slope: f64,
-    /// Steepest slope, rise over run.
+    /// Steepest slope of a single cell, rise over run.
     pub steepest: f64,
     /// Plate energy: mean of the squared second derivatives (both pure ones and twice the mixed one), 1/mm2.
     pub plate: f64,
@@ -33,6 +33,7 @@ pub struct Gauge {
     ridge: Vec<f64>,
     bends: Vec<f64>,
     slopes: Vec<f64>,
+    steepest: f64,
     jumps: Vec<f64>,
     highest: f64,
 }
@@ -46,6 +47,10 @@ impl Gauge {
         let slope = |i: usize, j: usize| {
             let [a, b, c, d] = corners(i, j);
             DVec2::new(b + d - a - c, c + d - a - b) / (2.0 * pitch_mm)
+        };
+        let central = |i: usize, j: usize| {
+            let run = 2.0 * pitch_mm;
+            DVec2::new(z(i + 1, j) - z(i - 1, j), z(i, j + 1) - z(i, j - 1)) / run
         };
         let normal = |s: DVec2| DVec3::new(-s.x, -s.y, 1.0);
         let (columns, rows) = (grid.nx.saturating_sub(2), grid.ny.saturating_sub(2));
@@ -66,7 +71,9 @@ impl Gauge {
                 let [xx, yy] = [second(1, 0), second(0, 1)];
                 let here = slope(i, j);
                 push(&mut self.bends, xx * xx + 2.0 * mixed * mixed + yy * yy);
-                push(&mut self.slopes, here.length());
+                push(&mut self.slopes, central(i, j).length());
+                // Of no number the other one is kept: cells that reach beyond the outline do not count.
+                self.steepest = self.steepest.max(here.length());
                 for (di, dj) in [(1, 0), (0, 1)] {
                     let next = normal(slope(i + di, j + dj));
                     push(&mut self.jumps, normal(here).angle_between(next).to_degrees());
@@ -100,7 +107,7 @@ impl Gauge {
             ridge: of_errors(&self.ridge),
             highest: self.highest,
             slope: percentile(&mut self.slopes, 0.999),
-            steepest: self.slopes.iter().fold(0.0, |a, &s| s.max(a)),
+            steepest: self.steepest,
             plate: self.bends.iter().sum::<f64>() / self.bends.len().max(1) as f64,
             jump: percentile(&mut self.jumps, 0.99),
         }
@@ -188,6 +195,17 @@ mod tests {
         assert!((got.jump - 45.0).abs() < 0.01, "{}", got.jump);
         assert!((got.highest - 0.9375).abs() < 1e-6);
         assert_eq!(got.ridge, Some([0.0625, 0.0625]));
+    }
+
+    /// A step of 1 within one cell: a slope of 8 there, half of it by central differences at its nodes.
+    #[test]
+    fn the_steepest_is_that_of_a_cell() {
+        let grid = grid();
+        let mut gauge = Gauge::default();
+        let patch = sampled(&grid, |p| if p.x < 0.1 { 0.0 } else { 1.0 });
+        gauge.add(&patch, &grid, |_| None);
+        let got = gauge.finish();
+        assert!((got.steepest - 8.0).abs() < 1e-6 && (got.slope - 4.0).abs() < 1e-6, "{got:?}");
     }
 
     #[test]

@@ -181,11 +181,12 @@ impl Raised {
     }
 }
 
-/// The grid that a shape is measured on.
+/// The grid that a shape is measured on: its nodes are the centres of cells that tile the shape's box, as in the tables.
+/// So no node lies on an edge that follows the grid.
 fn grid(shape: &Shape, cell_mm: f64) -> Grid {
     let bounds = shape.region.bounds();
     let size = bounds.size() + DVec2::splat(4.0 * cell_mm);
-    Grid::covering(bounds.min - DVec2::splat(2.0 * cell_mm), size.x, size.y, cell_mm)
+    Grid::covering(bounds.min - DVec2::splat(1.5 * cell_mm), size.x, size.y, cell_mm)
         .expect("a small grid")
 }
 

@@ -4,26 +4,16 @@
 //! outline, zero on it and smooth elsewhere, joined from one of each segment. Near the outline it is the distance. With
 //! order 0 it is joined from the half planes of the edges ([`super::halfplanes`]).
 //!
-//! *Scan lines* (after Chen et al. 2008, who only tell that middles of scan lines and a normal distribution are used;
-//! all else is a reconstruction): with one direction the height goes by the place in the row's own interval; with
-//! more the middles of the lines in all directions are samples of a spine, kept where no other direction has a much
-//! shorter chord and a disc fits.
+//! *Scan lines* are in [`super::scan`].
 
 use super::halfplanes::Formula;
-use super::profile::{self, Flank, capped_height, profile_at, sample};
+use super::profile::{self, Flank, capped_height, profile_at};
+use super::scan::scan_lines;
 use super::{Patch, Remark, Segments, Window, inscribed_radius, inside_spans, lower_walls};
 use crate::geom::{DVec2, Grid, Ring, Tolerance, distance_to_segment};
 use crate::job::{CrestSpec, LayerSpec, Profile, SurfaceSpec};
 use crate::outline::{Figure, Region};
 use rayon::prelude::*;
-use std::f64::consts::PI;
-
-/// Distance of scan lines, in cells.
-const SPACING_CELLS: f64 = 2.0;
-/// A middle counts when its chord is at most this times any other direction's through it.
-const LONGER: f64 = 1.05;
-/// And its distance to the outline at least this part of its half chord.
-const DISC: f64 = 0.85;
 
 /// Foot and crest of a field, mm.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -35,7 +25,7 @@ pub struct Rise {
 }
 
 impl Rise {
-    fn at(self, part: f64) -> f32 {
+    pub(super) fn at(self, part: f64) -> f32 {
         (self.base_mm + (self.height_mm - self.base_mm).max(0.0) * part) as f32
     }
 }
@@ -100,7 +90,7 @@ fn raise_region(
 }
 
 /// The edges of a region's rings.
-fn edges_of(region: &Region) -> Vec<[DVec2; 2]> {
+pub(super) fn edges_of(region: &Region) -> Vec<[DVec2; 2]> {
     region.rings().flat_map(closed).collect()
 }
 
@@ -182,137 +172,6 @@ fn joined(p: DVec2, edges: &[[DVec2; 2]], order: u32) -> f64 {
         1 => 1.0 / sum,
         2 => 1.0 / sum.sqrt(),
         _ => libm::pow(sum, -1.0 / f64::from(order)),
-    }
-}
-
-/// Heights by scan lines in so many `directions` at the nodes inside the region, NaN outside; `None` where no middle of a
-/// line counts.
-pub fn scan_lines(
-    region: &Region,
-    directions: u32,
-    profile: Profile,
-    rise: Rise,
-    grid: &Grid,
-    window: &Window,
-) -> Option<Patch> {
-    let edges = edges_of(region);
-    if directions <= 1 {
-        return Some(along_rows(region, &edges, profile, rise, grid, window));
-    }
-    let outline = Segments::of_rings(region.rings());
-    let kept = middles(&edges, directions, &outline, SPACING_CELLS * grid.pitch_mm);
-    if kept.is_empty() {
-        return None;
-    }
-    let spine = Segments::of_lines(kept.chunks(1));
-    let distances = |segments: &Segments| {
-        let mut d = vec![f32::NAN; window.len()];
-        sample(region, segments, grid, window, |d| d as f32, &mut d);
-        d
-    };
-    let (to_outline, to_spine) = (distances(&outline), distances(&spine));
-    let mut patch = Patch::empty(*window);
-    for (z, (d_b, d_s)) in patch.z.iter_mut().zip(to_outline.into_iter().zip(to_spine)) {
-        let (d_b, d_s) = (f64::from(d_b), f64::from(d_s));
-        if !d_s.is_nan() {
-            *z = rise.at(profile_at(profile, if d_b > 0.0 { d_b / (d_b + d_s) } else { 0.0 }));
-        }
-    }
-    Some(patch)
-}
-
-/// Every row by itself: `u` is 1 in the middle of its interval and 0 at the ends.
-fn along_rows(
-    region: &Region,
-    edges: &[[DVec2; 2]],
-    profile: Profile,
-    rise: Rise,
-    grid: &Grid,
-    window: &Window,
-) -> Patch {
-    let mut patch = Patch::empty(*window);
-    let spans = inside_spans(region.rings(), grid, window);
-    let rows = patch.z.par_chunks_mut(window.nx.max(1)).zip(&spans).enumerate();
-    rows.for_each(|(j, (z, spans))| {
-        let y = grid.node(window.i0, window.j0 + j).y;
-        let ends = crossings(edges, DVec2::X, y);
-        for i in spans.iter().flat_map(|&(first, end)| first as usize..end as usize) {
-            let x = grid.node(window.i0 + i, window.j0 + j).x;
-            // Round-off may put a node just outside its interval: the nearest one counts.
-            let beyond = |pair: &[f64]| (pair[0] - x).max(x - pair[1]);
-            let pair = ends.chunks_exact(2).min_by(|a, b| beyond(a).total_cmp(&beyond(b)));
-            let u = pair.map_or(0.0, |pair| {
-                let (middle, half) = (0.5 * (pair[0] + pair[1]), 0.5 * (pair[1] - pair[0]));
-                if half > 0.0 { 1.0 - (x - middle).abs() / half } else { 0.0 }
-            });
-            z[i] = rise.at(profile_at(profile, u));
-        }
-    });
-    patch
-}
-
-/// Where the line along the unit vector `way` at `offset` to its left crosses the edges: places along it, ascending.
-fn crossings(edges: &[[DVec2; 2]], way: DVec2, offset: f64) -> Vec<f64> {
-    let side = way.perp();
-    let place = |&[a, b]: &[DVec2; 2]| {
-        let (p, q) = (side.dot(a) - offset, side.dot(b) - offset);
-        ((p < 0.0) != (q < 0.0)).then(|| {
-            let t = p / (p - q);
-            way.dot(a) * (1.0 - t) + way.dot(b) * t
-        })
-    };
-    let mut places: Vec<f64> = edges.iter().filter_map(place).collect();
-    places.sort_unstable_by(f64::total_cmp);
-    places
-}
-
-/// The middles of the scan lines in all directions that count as points of the spine.
-fn middles(edges: &[[DVec2; 2]], directions: u32, outline: &Segments, spacing: f64) -> Vec<DVec2> {
-    let way = |k: u32| {
-        let (sin, cos) = libm::sincos(PI * f64::from(k) / f64::from(directions));
-        DVec2::new(cos, sin)
-    };
-    let lines: Vec<(u32, f64)> = (0..directions)
-        .flat_map(|k| {
-            let side = way(k).perp();
-            let offsets = edges.iter().map(|e| side.dot(e[0]));
-            let (low, high) =
-                offsets.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(x), b.max(x)));
-            let count = ((high - low) / spacing).floor().max(0.0) as usize;
-            (0..count).map(move |j| (k, low + spacing * (j as f64 + 0.5)))
-        })
-        .collect();
-    let kept: Vec<Vec<DVec2>> = lines
-        .par_iter()
-        .map(|&(k, offset)| {
-            let (along, side) = (way(k), way(k).perp());
-            let ends = crossings(edges, along, offset);
-            let middles = ends.chunks_exact(2).map(|pair| {
-                let at = along * (0.5 * (pair[0] + pair[1])) + side * offset;
-                (at, 0.5 * (pair[1] - pair[0]))
-            });
-            middles
-                .filter(|&(at, half)| {
-                    outline.distance(at) >= DISC * half
-                        && (0..directions)
-                            .filter(|&other| other != k)
-                            .all(|other| 2.0 * half <= LONGER * chord(edges, way(other), at))
-                })
-                .map(|(at, _)| at)
-                .collect()
-        })
-        .collect();
-    kept.concat()
-}
-
-/// Length of the chord through a point inside.
-fn chord(edges: &[[DVec2; 2]], way: DVec2, at: DVec2) -> f64 {
-    let here = way.dot(at);
-    let ends = crossings(edges, way, way.perp().dot(at));
-    let k = ends.partition_point(|&x| x <= here);
-    match (k.checked_sub(1).and_then(|k| ends.get(k)), ends.get(k)) {
-        (Some(low), Some(high)) => high - low,
-        _ => 0.0,
     }
 }
 

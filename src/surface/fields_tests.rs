@@ -29,36 +29,6 @@ fn the_r_function_of_a_square_is_as_tabled() {
     assert_eq!(joined(DVec2::new(1.0, 0.3), &edges, 2), 0.0);
 }
 
-/// A long band: its parts away from the ends are exact for every field that goes by the middle.
-fn band() -> Region {
-    let outer = [[0.0, 0.0], [10.0, 0.0], [10.0, 2.0], [0.0, 2.0]].map(DVec2::from).to_vec();
-    Region { outer, holes: vec![] }
-}
-
-#[test]
-fn scan_lines_find_the_middle_of_a_band() {
-    let grid = Grid::covering(DVec2::new(-0.5, -0.5), 11.0, 3.0, 0.05).unwrap();
-    let window = Window::whole(&grid);
-    let rise = Rise { base_mm: 0.2, height_mm: 1.0 };
-    let patch = scan_lines(&band(), 8, Profile::Parabola, rise, &grid, &window).unwrap();
-    let mut seen = 0;
-    for (j, i) in (0..grid.ny).flat_map(|j| (0..grid.nx).map(move |i| (j, i))) {
-        let p = grid.node(i, j);
-        if (1.5..8.5).contains(&p.x) && (0.0..2.0).contains(&p.y) {
-            let exact = 0.2 + 0.8 * (1.0 - (p.y - 1.0) * (p.y - 1.0));
-            // Points of the spine are up to a line's distance apart.
-            assert!((f64::from(patch.at(i, j)) - exact).abs() < 0.01, "{p}");
-            seen += 1;
-        }
-    }
-    assert!(seen > 1000);
-    // Row by row the ridge runs across the whole of it.
-    let rows = scan_lines(&band(), 1, Profile::Bell, rise, &grid, &window).unwrap();
-    let p = grid.to_grid(DVec2::new(2.5, 1.0)).round();
-    let got = f64::from(rows.at(p.x as usize, p.y as usize));
-    assert!((got - (0.2 + 0.8 * 0.496808)).abs() < 1e-5, "{got}");
-}
-
 #[test]
 fn degenerate_regions_get_heights_without_panic() {
     let grid = Grid::covering(DVec2::ZERO, 4.0, 4.0, 0.25).unwrap();
