@@ -11,6 +11,7 @@ mod deviation;
 mod distance;
 mod extremes;
 mod failure;
+mod halves;
 mod oracle;
 mod part;
 mod replay;
@@ -196,8 +197,11 @@ pub fn judge(
     let mut gouge = None;
     let held = match wanted {
         Some(Wanted { target, reach }) => {
-            let held = deviation::hold(&replay.carved, target, reach, setup);
-            gouge = deviation::judge_gouge(&held, &tracks, parts, setup, target, &mut ledger);
+            let mut held = deviation::hold(&replay.carved, target, reach, setup);
+            let halves = halves::hold(&tracks, setup, target, reach);
+            held.leftover.between_mm = halves.left_mm;
+            gouge =
+                deviation::judge_gouge(&held, &halves, &tracks, parts, setup, target, &mut ledger);
             deviation::judge_leftover(&held, setup, &mut ledger);
             held
         }

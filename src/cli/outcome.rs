@@ -277,7 +277,7 @@ fn report_data(carving: &Carving) -> ReportData {
         checks: checks(carving),
         leftover: vec![
             leftover("everywhere", &verdict.leftover.all),
-            leftover("where the cutters reach", &verdict.leftover.reachable),
+            leftover(&verdict.leftover.within_reach(), &verdict.leftover.reachable),
             leftover("where only a smaller cutter would", &verdict.leftover.unreachable),
         ],
         notes: carving.notes.clone(),

@@ -4,11 +4,10 @@ use super::Part;
 use super::Setup;
 use super::distance::Terrain;
 use super::failure::{FailureKind, Finding, Ledger};
+use super::halves::Halves;
 use super::oracle::{self, SplitMix64, Track};
 use super::walls::Walls;
-use crate::cutter::Profile;
-use crate::geom::{DVec2, DVec3, Grid, Heightfield};
-use crate::stock::Block;
+use crate::geom::{DVec2, DVec3, Heightfield};
 use rayon::prelude::*;
 
 /// How far the two oracles may lie apart, mm (heights are stored in single precision).
@@ -45,10 +44,22 @@ pub struct Leftover {
     pub reachable: Quantiles,
     /// Where only a smaller cutter would.
     pub unreachable: Quantiles,
+    /// A bound of what is left halfway between nodes where the cutters come that near to both, walls left out, mm. A cutter
+    /// may come less near between two nodes than at them (along a rim that the grid makes stairs of).
+    pub between_mm: f64,
     /// Fraction of all nodes where more than scallop + gouge is left above what the cutters reach.
     pub over_fraction: f64,
     /// The most that is left above what the cutters reach at such nodes, mm; 0 where there are none.
     pub over_max_mm: f64,
+}
+
+impl Leftover {
+    /// The place of [`Leftover::reachable`] in words, with the bound between nodes where that is more.
+    pub fn within_reach(&self) -> String {
+        let more = self.between_mm > self.reachable.max_mm;
+        let bound = more.then(|| format!(" (between nodes at most {:.3})", self.between_mm));
+        format!("where the cutters reach{}", bound.unwrap_or_default())
+    }
 }
 
 /// The deepest penetration into the target.
@@ -66,14 +77,14 @@ pub struct Gouge {
 
 /// A place with its amount.
 #[derive(Debug, Clone, Copy)]
-struct Spot {
-    amount: f64,
-    at: DVec3,
+pub(super) struct Spot {
+    pub(super) amount: f64,
+    pub(super) at: DVec3,
 }
 
 impl Spot {
     /// The larger of both; the first one when they are equal.
-    fn worse(a: Option<Self>, b: Option<Self>) -> Option<Self> {
+    pub(super) fn worse(a: Option<Self>, b: Option<Self>) -> Option<Self> {
         match (a, b) {
             (Some(x), Some(y)) if y.amount > x.amount => b,
             (None, _) => b,
@@ -84,18 +95,18 @@ impl Spot {
 
 /// Places of one kind: how many, and the worst.
 #[derive(Debug, Clone, Copy, Default)]
-struct Tally {
+pub(super) struct Tally {
     count: usize,
     worst: Option<Spot>,
 }
 
 impl Tally {
-    fn add(&mut self, amount: f64, at: DVec3) {
+    pub(super) fn add(&mut self, amount: f64, at: DVec3) {
         self.count += 1;
         self.worst = Spot::worse(self.worst, Some(Spot { amount, at }));
     }
 
-    fn join(self, o: Self) -> Self {
+    pub(super) fn join(self, o: Self) -> Self {
         Self { count: self.count + o.count, worst: Spot::worse(self.worst, o.worst) }
     }
 }
@@ -192,7 +203,7 @@ pub(super) fn hold(
 }
 
 /// True where a cutter that leaves the wood at height `reach` comes within a scallop of the target at `at`.
-fn comes_near(terrain: &Terrain, at: DVec3, reach: f64, scallop_mm: f64) -> bool {
+pub(super) fn comes_near(terrain: &Terrain, at: DVec3, reach: f64, scallop_mm: f64) -> bool {
     reach - at.z <= scallop_mm || terrain.distance(at.with_z(reach)) <= scallop_mm
 }
 
@@ -218,6 +229,7 @@ fn leftover(rows: &[RowFound]) -> (Leftover, Tally) {
     let leftover = Leftover {
         over_fraction: over.count as f64 / all.len().max(1) as f64,
         over_max_mm: over.worst.map_or(0.0, |s| s.amount),
+        between_mm: 0.0,
         all: quantiles(&mut all),
         reachable: quantiles(&mut reachable),
         unreachable: quantiles(&mut unreachable),
@@ -246,20 +258,15 @@ fn quantiles(values: &mut [f32]) -> Quantiles {
 /// Finds the deepest penetration at the nodes and between them, and who did it; too deep is a failure.
 pub(super) fn judge_gouge(
     held: &Held,
+    halves: &Halves,
     tracks: &[Track],
     parts: &[Part],
     setup: &Setup,
     target: &Heightfield,
     ledger: &mut Ledger,
 ) -> Option<Gouge> {
-    let terrain = Terrain::new(target);
-    let mut deepest = held.rows.iter().fold(None, |a, r| Spot::worse(a, r.gouge));
-    let mut too_deep = held.rows.iter().map(|r| r.too_deep).fold(Tally::default(), Tally::join);
-    for shift in [DVec2::new(0.5, 0.0), DVec2::new(0.0, 0.5), DVec2::new(0.5, 0.5)] {
-        let (spot, tally) = between(tracks, setup, target, &terrain, shift);
-        deepest = Spot::worse(deepest, spot);
-        too_deep = too_deep.join(tally);
-    }
+    let deepest = held.rows.iter().fold(halves.gouge, |a, r| Spot::worse(a, r.gouge));
+    let too_deep = held.rows.iter().map(|r| r.too_deep).fold(halves.too_deep, Tally::join);
     let overcut = judge_walls(tracks, parts, setup, target, ledger);
     let Some(spot) = deepest else { return overcut };
     let by = oracle::lowest(tracks, &[spot.at.truncate()])[0].by;
@@ -297,58 +304,6 @@ fn judge_walls(
         }
     }
     deepest
-}
-
-/// Penetration at the points that lie `shift` pitches beside the nodes.
-///
-/// A cutter between two nodes can enter the triangles there without showing at the nodes. So the
-/// moves are carved again on a shifted grid and held against the surface itself.
-fn between(
-    tracks: &[Track],
-    setup: &Setup,
-    target: &Heightfield,
-    terrain: &Terrain,
-    shift: DVec2,
-) -> (Option<Spot>, Tally) {
-    let grid = *target.grid();
-    let shifted = Grid {
-        nx: grid.nx - usize::from(shift.x > 0.0),
-        ny: grid.ny - usize::from(shift.y > 0.0),
-        origin: grid.origin + shift * grid.pitch_mm,
-        ..grid
-    };
-    let mut block = Block::new(&setup.stock, shifted);
-    for track in tracks {
-        block.cut(&Profile::of(track.cutter), track.moves);
-    }
-    let carved = block.into_field();
-    let gouge_mm = setup.tolerance.gouge_mm;
-    let (di, dj) = (usize::from(shift.x > 0.0), usize::from(shift.y > 0.0));
-    let rows: Vec<(Option<Spot>, Tally)> = (0..shifted.ny)
-        .into_par_iter()
-        .map(|j| {
-            let (mut deepest, mut too_deep) = (None, Tally::default());
-            // Halfway between these two nodes (across the cell: on its diagonal) the surface is their mean.
-            let (a, b) = (target.row(j), target.row(j + dj));
-            for (i, &c) in carved.row(j).iter().enumerate() {
-                let t = 0.5 * (f64::from(a[i]) + f64::from(b[i + di]));
-                let c = f64::from(c);
-                let known = deepest.map_or(0.0, |s: Spot| s.amount).min(gouge_mm);
-                if t - c > known {
-                    let at = shifted.node(i, j).extend(c);
-                    let amount = terrain.distance(at);
-                    deepest = Spot::worse(deepest, Some(Spot { amount, at }));
-                    if amount > gouge_mm {
-                        too_deep.add(amount, at);
-                    }
-                }
-            }
-            (deepest, too_deep)
-        })
-        .collect();
-    rows.into_iter().fold((None, Tally::default()), |(s, t), (spot, tally)| {
-        (Spot::worse(s, spot), t.join(tally))
-    })
 }
 
 /// A strict job answers for every node that its cutters reach.

@@ -497,12 +497,12 @@ fn what_no_cutter_reaches_is_counted_apart() {
     assert!(rim > 0.5 && rim < 0.6, "{rim}");
 }
 
-#[test]
-fn a_raster_on_a_plane_leaves_the_analytic_cusp() {
+/// A plane 2 mm down, rastered by a ball of 3 mm with passes so far apart, over nodes 0.1 mm apart.
+fn rastered(stepover_mm: f64) -> Leftover {
     let job = job(cutter(CutterShape::Ball, 3.0));
     let mut text = String::from("G21 G90\nG0 Z5\nM3 S18000\nG4 P2\nG0 X0 Y0\nG1 Z-2 F300\nF1500\n");
-    for k in 0..51_i32 {
-        let y = f64::from(k) * 0.4;
+    for k in 0..=(20.0 / stepover_mm).ceil() as i32 {
+        let y = (f64::from(k) * stepover_mm).min(20.0);
         let (a, b) = if k % 2 == 0 { (0, 40) } else { (40, 0) };
         writeln!(text, "G1 X{a} Y{y:.3}\nX{b}").unwrap();
     }
@@ -513,12 +513,30 @@ fn a_raster_on_a_plane_leaves_the_analytic_cusp() {
         [ProgramText { name: "1-test.nc", text: &text, cutter: &job.operations[0].cutter }];
     let v = prove(&programs, &job, &plane, &plane).unwrap();
     assert!(v.passed(), "{:#?}", v.failures);
+    v.leftover
+}
+
+#[test]
+fn a_raster_on_a_plane_leaves_the_analytic_cusp() {
+    let left = rastered(0.4);
     let cusp = |d: f64| 1.5 - (1.5_f64 * 1.5 - d * d).sqrt();
     // Nodes lie 0, 0.1, 0.2, 0.1 mm beside the passes, so a quarter of them on the crest.
-    assert!((v.leftover.all.max_mm - cusp(0.2)).abs() < 1e-6);
-    assert!((v.leftover.all.p90_mm - cusp(0.2)).abs() < 1e-6);
-    assert!((v.leftover.all.p50_mm - cusp(0.1)).abs() < 1e-6);
-    assert_eq!(v.leftover.unreachable.nodes, 0);
+    assert!((left.all.max_mm - cusp(0.2)).abs() < 1e-6);
+    assert!((left.all.p90_mm - cusp(0.2)).abs() < 1e-6);
+    assert!((left.all.p50_mm - cusp(0.1)).abs() < 1e-6);
+    assert_eq!(left.unreachable.nodes, 0);
+    assert!((left.between_mm - cusp(0.2)).abs() < 1e-6);
+}
+
+/// Of passes three pitches apart every node lies a pitch beside one at most; the crests are halfway between nodes.
+#[test]
+fn crests_between_the_nodes_are_told() {
+    let left = rastered(0.3);
+    let cusp = |d: f64| 1.5 - (1.5_f64 * 1.5 - d * d).sqrt();
+    assert!((left.all.max_mm - cusp(0.1)).abs() < 1e-6);
+    assert!((left.between_mm - cusp(0.15)).abs() < 1e-6, "{}", left.between_mm);
+    let bound = format!("where the cutters reach (between nodes at most {:.3})", cusp(0.15));
+    assert_eq!(left.within_reach(), bound);
 }
 
 #[test]

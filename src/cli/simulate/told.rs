@@ -37,11 +37,11 @@ pub(super) fn text(done: &Simulated, written: Option<&str>) -> String {
             );
         }
         for (place, q) in [
-            ("everywhere", &verdict.leftover.all),
-            ("where the cutters reach", &verdict.leftover.reachable),
-            ("where only smaller ones would", &verdict.leftover.unreachable),
+            ("everywhere".to_owned(), &verdict.leftover.all),
+            (verdict.leftover.within_reach(), &verdict.leftover.reachable),
+            ("where only smaller ones would".to_owned(), &verdict.leftover.unreachable),
         ] {
-            out += &leftover(place, q);
+            out += &leftover(&place, q);
         }
         for (name, share) in would_reach {
             let _ = writeln!(out, "  {name} would reach {:.0} % of the latter", 100.0 * share);
