@@ -191,13 +191,22 @@ pub fn read(
     let (field, covered) = if bytes.starts_with(&picture::SIGNATURE) {
         onto(&png(bytes, given)?, grid, beyond_mm)?
     } else {
-        let seen = Facets::read(bytes)?.onto(grid, beyond_mm)?;
+        let facets = Facets::read(bytes)?;
+        let seen = facets.onto(grid, beyond_mm)?;
         if seen.is_inside_out {
             notes.push(
                 "the mesh is turned inside out: read as if its facets looked outwards".into(),
             );
         }
-        (seen.field, seen.covered)
+        if seen.through > 0 {
+            let area_mm2 = seen.through as f64 * grid.pitch_mm * grid.pitch_mm;
+            let bottom_mm = facets.bounds().0.z;
+            notes.push(format!(
+                "the mesh has holes right through it ({area_mm2:.0} mm2): there the target is its \
+                 bottom, Z{bottom_mm:.3}"
+            ));
+        }
+        (seen.field, seen.covered + seen.through)
     };
     if covered < grid.len() {
         let part = 100.0 * (1.0 - covered as f64 / grid.len() as f64);

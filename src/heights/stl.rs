@@ -19,6 +19,8 @@ const SNAP: f64 = 2e-3;
 const CLEARLY_MM: f32 = 1e-3;
 /// Smallest and largest sizes of a mesh that can be meant in millimetres.
 const SIZES_MM: [f64; 2] = [1.0, 10_000.0];
+/// A mesh is closed when the facets that it would need to be so have less than this part of the area of its holes.
+const MISSING_PART: f64 = 0.1;
 /// Rows of nodes that one task draws.
 const ROWS: usize = 32;
 
@@ -39,6 +41,8 @@ pub struct Seen {
     pub covered: usize,
     /// Its facets look inwards.
     pub is_inside_out: bool,
+    /// Number of nodes over holes right through it, which have the height of its bottom.
+    pub through: usize,
 }
 
 impl Facets {
@@ -96,7 +100,7 @@ impl Facets {
     }
 
     /// The heights of the mesh at the nodes of a grid, seen from above: the highest facet counts. Nodes beyond its outline
-    /// get `beyond_mm`.
+    /// get `beyond_mm`, those in holes right through a closed mesh the height of its bottom.
     ///
     /// # Errors
     /// [`HeightsError::Beside`], [`HeightsError::Hole`], [`HeightsError::Inside`].
@@ -134,7 +138,12 @@ impl Facets {
             return Err(beside(self.min.truncate(), self.max.truncate()));
         }
         let holes = enclosed(open, grid.nx);
-        if let Some(&first) = holes.first() {
+        let through = if self.is_closed(area_mm2(holes.len())) { holes.len() } else { 0 };
+        if through > 0 {
+            for &k in &holes {
+                up[k] = self.min.z as f32;
+            }
+        } else if let Some(&first) = holes.first() {
             let at = grid.node(first % grid.nx, first / grid.nx);
             return Err(HeightsError::Hole {
                 x_mm: at.x,
@@ -145,7 +154,18 @@ impl Facets {
         for z in up.iter_mut().filter(|z| **z == f32::NEG_INFINITY) {
             *z = beyond_mm;
         }
-        Ok(Seen { field: Heightfield::from_z(*grid, up), covered, is_inside_out })
+        Ok(Seen { field: Heightfield::from_z(*grid, up), covered, is_inside_out, through })
+    }
+
+    /// True when holes of this area cannot be missing facets: what faces each way adds up to nothing over a closed surface,
+    /// and to a hole's own area where facets are missing.
+    fn is_closed(&self, holes_mm2: f64) -> bool {
+        let twice = |c: &[[f32; 3]; 3]| {
+            let [a, b, c] = c.map(|p| DVec3::from(p.map(f64::from)));
+            (b - a).cross(c - a)
+        };
+        let sum: DVec3 = self.corners.iter().map(twice).sum();
+        0.5 * sum.length() < MISSING_PART * holes_mm2
     }
 
     /// For each band of rows the facets with area that reach into it.

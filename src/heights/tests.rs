@@ -174,6 +174,48 @@ fn a_hole_in_the_top_is_told_and_room_around_the_mesh_is_not_one() {
     assert!(got.notes[0].contains("33.1 %"), "{:?}", got.notes);
 }
 
+/// The same plates with walls all round, inside and out: node (5, 5) lies in a hole through a closed solid.
+#[test]
+fn a_hole_through_a_closed_mesh_goes_down_to_its_bottom() {
+    let (top, bottom) = (-1.0, -4.0);
+    let mut facets: Vec<[[f32; 3]; 3]> = Vec::new();
+    for (x, y) in [
+        ([1.0, 4.0], [1.0, 9.0]),
+        ([6.0, 9.0], [1.0, 9.0]),
+        ([4.0, 6.0], [1.0, 4.0]),
+        ([4.0, 6.0], [6.0, 9.0]),
+    ] {
+        facets.extend(plate(x, y, top));
+        facets.extend(plate(x, y, bottom).map(|f| [f[0], f[2], f[1]]));
+    }
+    // Counter-clockwise rings have the wood on their left.
+    let wall = |a: [f32; 2], b: [f32; 2]| {
+        let [p, q, r, s] =
+            [(a, bottom), (b, bottom), (b, top), (a, top)].map(|(p, z)| [p[0], p[1], z]);
+        [[p, q, r], [p, r, s]]
+    };
+    let mut hole = Vec::new();
+    for (ring, facets) in [
+        ([[1.0, 1.0], [9.0, 1.0], [9.0, 9.0], [1.0, 9.0]], &mut facets),
+        ([[4.0, 4.0], [4.0, 6.0], [6.0, 6.0], [6.0, 4.0]], &mut hole),
+    ] {
+        for k in 0..4 {
+            facets.extend(wall(ring[k], ring[(k + 1) % 4]));
+        }
+    }
+    let closed = binary(&[facets.as_slice(), &hole].concat());
+    let got = read(&closed, None, &grid_of(11), 0.0).unwrap();
+    let at = |i, j| got.field.at(i, j);
+    assert_eq!([at(5, 5), at(4, 5), at(2, 2), at(0, 0)], [bottom, top, top, 0.0]);
+    assert!(got.notes[0].contains("right through it (1 mm2)"), "{:?}", got.notes);
+    // Without a plate of the top it is open there: node (7, 5) and others are bare, but the bottom shows.
+    let open = binary(&[&facets[..4], &facets[6..], &hole].concat());
+    assert!(matches!(
+        read(&open, None, &grid_of(11), 0.0).unwrap_err(),
+        HeightsError::Inside { .. }
+    ));
+}
+
 #[test]
 fn meshes_in_other_units_or_at_other_places_are_refused() {
     for size in [0.16, 160_000.0] {
