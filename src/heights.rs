@@ -202,7 +202,7 @@ pub fn read(
             let area_mm2 = seen.through as f64 * grid.pitch_mm * grid.pitch_mm;
             let bottom_mm = facets.bounds().0.z;
             notes.push(format!(
-                "the mesh has holes right through it ({area_mm2:.0} mm2): there the target is its \
+                "the mesh has holes right through it ({area_mm2:.2} mm2): there the target is its \
                  bottom, Z{bottom_mm:.3}"
             ));
         }

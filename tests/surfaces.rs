@@ -59,7 +59,9 @@ fn surfaces_are_as_true_and_as_smooth_as_tabled() {
                 let name = method.name();
                 let worse = WORSE.iter().find(|w| w.0 == name && w.1 == k).map(|w| w.2);
                 let digit = if k == 4 { RIDGE_DIGIT } else { DIGIT };
-                let most = worse.unwrap_or(tabled * (1.0 + WITHIN) + digit);
+                // Of the scan lines the ridge is joined: a fifth of the tabled error.
+                let joined = (k == 4 && name.starts_with("C2")).then_some(0.01);
+                let most = worse.or(joined).unwrap_or(tabled * (1.0 + WITHIN) + digit);
                 assert!(got[k] <= most, "{outline:?} {name} figure {k}: {} / {tabled}", got[k]);
                 // The highest point and the slope are no errors: less is not better.
                 let gentler = GENTLER.iter().find(|g| g.0 == name && k == 6).map(|g| g.1);

@@ -19,7 +19,8 @@ const SNAP: f64 = 2e-3;
 const CLEARLY_MM: f32 = 1e-3;
 /// Smallest and largest sizes of a mesh that can be meant in millimetres.
 const SIZES_MM: [f64; 2] = [1.0, 10_000.0];
-/// A mesh is closed when the facets that it would need to be so have less than this part of the area of its holes.
+/// A mesh is closed when the facets that it would need to be so have less than this part of the area of its holes, or of
+/// itself where that is less.
 const MISSING_PART: f64 = 0.1;
 /// Rows of nodes that one task draws.
 const ROWS: usize = 32;
@@ -138,7 +139,8 @@ impl Facets {
             return Err(beside(self.min.truncate(), self.max.truncate()));
         }
         let holes = enclosed(open, grid.nx);
-        let through = if self.is_closed(area_mm2(holes.len())) { holes.len() } else { 0 };
+        let is_closed = self.is_closed(area_mm2(holes.len().min(covered)));
+        let through = if is_closed { holes.len() } else { 0 };
         if through > 0 {
             for &k in &holes {
                 up[k] = self.min.z as f32;
@@ -157,15 +159,16 @@ impl Facets {
         Ok(Seen { field: Heightfield::from_z(*grid, up), covered, is_inside_out, through })
     }
 
-    /// True when holes of this area cannot be missing facets: what faces each way adds up to nothing over a closed surface,
-    /// and to a hole's own area where facets are missing.
-    fn is_closed(&self, holes_mm2: f64) -> bool {
+    /// True for a solid, false for an open sheet: what faces each way adds up to nothing over a closed surface (and where
+    /// top and bottom lack the same piece), to the sheet's own area over a sheet. A solid that lacks a piece of its top only
+    /// is known by its bottom, which then shows from above.
+    fn is_closed(&self, area_mm2: f64) -> bool {
         let twice = |c: &[[f32; 3]; 3]| {
             let [a, b, c] = c.map(|p| DVec3::from(p.map(f64::from)));
             (b - a).cross(c - a)
         };
         let sum: DVec3 = self.corners.iter().map(twice).sum();
-        0.5 * sum.length() < MISSING_PART * holes_mm2
+        0.5 * sum.length() < MISSING_PART * area_mm2
     }
 
     /// For each band of rows the facets with area that reach into it.

@@ -207,7 +207,19 @@ fn a_hole_through_a_closed_mesh_goes_down_to_its_bottom() {
     let got = read(&closed, None, &grid_of(11), 0.0).unwrap();
     let at = |i, j| got.field.at(i, j);
     assert_eq!([at(5, 5), at(4, 5), at(2, 2), at(0, 0)], [bottom, top, top, 0.0]);
-    assert!(got.notes[0].contains("right through it (1 mm2)"), "{:?}", got.notes);
+    assert!(got.notes[0].contains("right through it (1.00 mm2)"), "{:?}", got.notes);
+    // A narrow sheet round a wide hole is no solid.
+    let frame: Vec<[[f32; 3]; 3]> = [
+        ([0.0, 10.0], [0.0, 0.4]),
+        ([0.0, 10.0], [9.6, 10.0]),
+        ([0.0, 0.4], [0.4, 9.6]),
+        ([9.6, 10.0], [0.4, 9.6]),
+    ]
+    .into_iter()
+    .flat_map(|(x, y)| plate(x, y, top))
+    .collect();
+    let said = read(&binary(&frame), None, &grid_of(11), 0.0).unwrap_err();
+    assert!(matches!(said, HeightsError::Hole { .. }), "{said}");
     // Without a plate of the top it is open there: node (7, 5) and others are bare, but the bottom shows.
     let open = binary(&[&facets[..4], &facets[6..], &hole].concat());
     assert!(matches!(

@@ -44,8 +44,9 @@ pub struct Leftover {
     pub reachable: Quantiles,
     /// Where only a smaller cutter would.
     pub unreachable: Quantiles,
-    /// A bound of what is left halfway between nodes where the cutters come that near to both, walls left out, mm. A cutter
-    /// may come less near between two nodes than at them (along a rim that the grid makes stairs of).
+    /// A bound of what is left halfway between nodes where the cutters come that near to both, mm; cells that rise by more
+    /// than 1.5 pitches (steep flanks and walls) are left out. A cutter may come less near between two nodes than at them
+    /// (along a rim that the grid makes stairs of).
     pub between_mm: f64,
     /// Fraction of all nodes where more than scallop + gouge is left above what the cutters reach.
     pub over_fraction: f64,
@@ -57,7 +58,9 @@ impl Leftover {
     /// The place of [`Leftover::reachable`] in words, with the bound between nodes where that is more.
     pub fn within_reach(&self) -> String {
         let more = self.between_mm > self.reachable.max_mm;
-        let bound = more.then(|| format!(" (between nodes at most {:.3})", self.between_mm));
+        let bound = more.then(|| {
+            format!(" (between nodes at most {:.3}, steep flanks left out)", self.between_mm)
+        });
         format!("where the cutters reach{}", bound.unwrap_or_default())
     }
 }
@@ -265,8 +268,10 @@ pub(super) fn judge_gouge(
     target: &Heightfield,
     ledger: &mut Ledger,
 ) -> Option<Gouge> {
-    let deepest = held.rows.iter().fold(halves.gouge, |a, r| Spot::worse(a, r.gouge));
-    let too_deep = held.rows.iter().map(|r| r.too_deep).fold(halves.too_deep, Tally::join);
+    let deepest = held.rows.iter().fold(None, |a, r| Spot::worse(a, r.gouge));
+    let deepest = Spot::worse(deepest, halves.gouge);
+    let too_deep = held.rows.iter().map(|r| r.too_deep).fold(Tally::default(), Tally::join);
+    let too_deep = too_deep.join(halves.too_deep);
     let overcut = judge_walls(tracks, parts, setup, target, ledger);
     let Some(spot) = deepest else { return overcut };
     let by = oracle::lowest(tracks, &[spot.at.truncate()])[0].by;

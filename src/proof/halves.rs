@@ -24,7 +24,8 @@ use rayon::prelude::*;
 
 /// The shifts, in pitches.
 const SHIFTS: [DVec2; 3] = [DVec2::new(0.5, 0.0), DVec2::new(0.0, 0.5), DVec2::new(0.5, 0.5)];
-/// A cell is part of a wall when its heights differ by more than so many pitches.
+/// A cell is steep, and what is left over it not looked at, when its heights differ by more than so many pitches: about 56
+/// degrees along the grid, 47 across it. There the grid's own facets are rougher than what a cutter leaves.
 const STEEP_PITCHES: f64 = 1.5;
 
 /// What is found between the nodes.
@@ -33,7 +34,7 @@ pub(super) struct Halves {
     /// The deepest penetration, and all beyond the tolerance.
     pub(super) gouge: Option<Spot>,
     pub(super) too_deep: Tally,
-    /// The most that is left within reach beside walls, mm.
+    /// The most that is left within reach, cells that are steep left out, mm.
     pub(super) left_mm: f64,
 }
 
@@ -101,14 +102,14 @@ impl Against<'_> {
                         row.too_deep.add(amount, at);
                     }
                 }
-                if !stock.contains(at.truncate()) || self.is_wall(i, j, shift) {
+                if c - t <= row.left_mm || !stock.contains(at.truncate()) {
                     continue;
                 }
                 let is_near = |i: usize, j: usize| {
                     let (t, r) = (f64::from(self.target.at(i, j)), f64::from(self.reach.at(i, j)));
                     comes_near(&self.terrain, grid.node(i, j).extend(t), r, scallop_mm)
                 };
-                if c - t > row.left_mm && is_near(i, j) && is_near(i + di, j + dj) {
+                if !self.is_steep(i, j, shift) && is_near(i, j) && is_near(i + di, j + dj) {
                     row.left_mm = row.left_mm.max(self.terrain.distance(at));
                 }
             }
@@ -117,23 +118,23 @@ impl Against<'_> {
         (0..shifted.ny).into_par_iter().map(row).collect()
     }
 
-    /// True where a cell round this point of a shifted grid is part of a wall.
-    fn is_wall(&self, i: usize, j: usize, shift: DVec2) -> bool {
+    /// True where a cell round this point of a shifted grid is steep.
+    fn is_steep(&self, i: usize, j: usize, shift: DVec2) -> bool {
         let (before_i, before_j) = (usize::from(shift.x == 0.0), usize::from(shift.y == 0.0));
         (j.saturating_sub(before_j)..=j)
-            .any(|j| (i.saturating_sub(before_i)..=i).any(|i| self.is_wall_cell(i, j)))
+            .any(|j| (i.saturating_sub(before_i)..=i).any(|i| self.is_steep_cell(i, j)))
     }
 
-    /// True where target or reach rise by more between nodes than a cutter can follow.
-    fn is_wall_cell(&self, i: usize, j: usize) -> bool {
+    /// True where target or reach rise by much between the nodes of a cell.
+    fn is_steep_cell(&self, i: usize, j: usize) -> bool {
         let grid = self.target.grid();
         let most = STEEP_PITCHES * grid.pitch_mm;
-        let is_steep = |of: &Heightfield| {
+        let rises = |of: &Heightfield| {
             let z = [of.at(i, j), of.at(i + 1, j), of.at(i, j + 1), of.at(i + 1, j + 1)];
             let low = z.iter().copied().fold(f32::INFINITY, f32::min);
             let high = z.iter().copied().fold(f32::NEG_INFINITY, f32::max);
             f64::from(high - low) > most
         };
-        i + 1 < grid.nx && j + 1 < grid.ny && (is_steep(self.target) || is_steep(self.reach))
+        i + 1 < grid.nx && j + 1 < grid.ny && (rises(self.target) || rises(self.reach))
     }
 }

@@ -535,8 +535,8 @@ fn crests_between_the_nodes_are_told() {
     let cusp = |d: f64| 1.5 - (1.5_f64 * 1.5 - d * d).sqrt();
     assert!((left.all.max_mm - cusp(0.1)).abs() < 1e-6);
     assert!((left.between_mm - cusp(0.15)).abs() < 1e-6, "{}", left.between_mm);
-    let bound = format!("where the cutters reach (between nodes at most {:.3})", cusp(0.15));
-    assert_eq!(left.within_reach(), bound);
+    let bound = format!("(between nodes at most {:.3}, steep flanks left out)", cusp(0.15));
+    assert_eq!(left.within_reach(), format!("where the cutters reach {bound}"));
 }
 
 #[test]

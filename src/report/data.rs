@@ -133,7 +133,7 @@ pub struct Check {
 /// What stays above the target, measured normal to it.
 #[derive(Debug, Clone, Default)]
 pub struct LeftoverRow {
-    /// Where: `everywhere`, `where the cutters reach`.
+    /// Where: `everywhere`, `where the cutters reach` (with what may be left between nodes).
     pub place: String,
     /// Median, mm.
     pub p50_mm: f64,

@@ -26,6 +26,8 @@ const LONGER: f64 = 1.05;
 const DISC: f64 = 0.85;
 /// Between middles that count, a chain goes on over chords up to this times another direction's.
 const GOES_ON: f64 = 1.1;
+/// Half a chord of less than this part of their distance is none.
+const LEAST_PART: f64 = 1e-6;
 /// An end of a chain meets another chain when it is this near, in distances of scan lines.
 const MEETS: f64 = 2.0;
 
@@ -120,7 +122,7 @@ struct Middle {
     half: f64,
     /// No other direction has a much shorter chord through it.
     goes_on: bool,
-    /// That is so, and a disc nearly as wide as the chord fits round it.
+    /// No other direction has a shorter one to speak of, and a disc nearly as wide as the chord fits round it.
     counts: bool,
 }
 
@@ -140,10 +142,18 @@ fn chains(
         let middle = |pair: &[f64]| {
             let at = along * (0.5 * (pair[0] + pair[1])) + side * offset;
             let half = 0.5 * (pair[1] - pair[0]);
-            let others = (0..directions).filter(|&other| other != k);
-            let shortest = others.map(|o| chord(edges, way(o), at)).fold(f64::INFINITY, f64::min);
-            let counts = 2.0 * half <= LONGER * shortest && outline.distance(at) >= DISC * half;
-            Middle { at, half, goes_on: 2.0 * half <= GOES_ON * shortest, counts }
+            // A line through a vertex has a chord of no length there, which is the shortest and tells nothing.
+            let mut shortest = if half > LEAST_PART * spacing_mm { f64::INFINITY } else { 0.0 };
+            for other in (0..directions).filter(|&other| other != k) {
+                if 2.0 * half > GOES_ON * shortest {
+                    break;
+                }
+                shortest = shortest.min(chord(edges, way(other), at));
+            }
+            let goes_on = 2.0 * half <= GOES_ON * shortest && shortest > 0.0;
+            let counts =
+                goes_on && 2.0 * half <= LONGER * shortest && outline.distance(at) >= DISC * half;
+            Middle { at, half, goes_on, counts }
         };
         crossings(edges, along, offset).chunks_exact(2).map(middle).collect()
     };

@@ -96,3 +96,27 @@ fn corners_get_no_ridge() {
     // At the corner's point the outline is .2 away, the spine at least .8 sqrt 2 - .3.
     assert!(got[0] > 0.99 && got[1] < 0.45, "{got:?}");
 }
+
+/// Two stems side by side, the lower one with a gable whose tip lies on a scan line: a chord of no length there does not
+/// lead the ridge to the outline.
+#[test]
+fn a_line_through_a_tip_draws_no_ridge_to_it() {
+    for tip in [3.7, 3.75, 3.8, 3.9] {
+        let outer: Ring = [
+            [0.0, 0.0],
+            [8.0, 0.0],
+            [8.0, 6.0],
+            [6.0, 6.0],
+            [6.0, 1.0],
+            [2.0, 1.0],
+            [2.0, 3.0],
+            [1.0, tip],
+            [0.0, 3.0],
+        ]
+        .map(DVec2::from)
+        .to_vec();
+        let got = heights(outer, 0.1, &[DVec2::new(1.0, 2.0), DVec2::new(1.0, 3.5)]);
+        // The tip is blunt: half way between it and the last disc the parabola has three quarters of its height.
+        assert!(got[0] > 0.97 && got[1] < 0.9, "{tip}: {got:?}");
+    }
+}
