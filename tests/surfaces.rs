@@ -28,8 +28,8 @@ const RIDGE_DIGIT: f64 = 5e-4;
 /// has it on the spine itself, and falls off between its nodes.
 const WORSE: [(&str, usize, f64); 3] =
     [("A+ butterfly", 3, 0.093), ("A+ butterfly", 4, 0.106), ("Harmonic", 4, 0.005)];
-/// Slopes below the tabled ones by more than that. Of Teddy's surface the heights are spread between the branches of the
-/// spine without steps; a table of a surface that has some says a slope of 6.74, and six times our plate energy.
+/// Slopes below the tabled ones by more than that. Ours spreads the heights of Teddy's surface between the branches of the
+/// spine without steps; the tabled one, with a slope of 6.74 and six times our plate energy, seems to have steps there.
 const GENTLER: [(&str, f64); 1] = [("T Teddy ellipse", 4.6)];
 /// Rows of literal patches over a triangle are parallel to its side with the lowest vertex; which that is, the table does
 /// not say. So it is here only that one crease is wider than tabled.
