@@ -63,7 +63,7 @@ pub struct Block {
 }
 
 /// Rows of nodes that one task carves.
-const BAND_ROWS: usize = 64;
+const BAND_ROWS: usize = 128;
 
 /// Moves that are carved by all tasks before the next ones are prepared: bounds what must be held for each. Few in tests, so
 /// that chains run across its limits there.

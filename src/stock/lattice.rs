@@ -50,9 +50,9 @@ pub(super) fn for_nodes(
     match sweep {
         Sweep::Stamp(s) => lattice.visit(batch, rows, s, sink),
         Sweep::Along(a) => match a.inner() {
-            Some((ends, true)) => lattice.visit(batch, rows, &Level(a, ends), sink),
-            Some((ends, false)) => lattice.visit(batch, rows, &Tilted(a, ends), sink),
-            None => lattice.visit(batch, rows, &Free(a), sink),
+            Some((ends, true)) => lattice.visit(batch, rows, &Level(*a, ends), sink),
+            Some((ends, false)) => lattice.visit(batch, rows, &Tilted(*a, ends), sink),
+            None => lattice.visit(batch, rows, &Free(*a), sink),
         },
         Sweep::Turned(t) => lattice.visit(batch, rows, t, sink),
     }

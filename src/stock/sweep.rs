@@ -238,15 +238,18 @@ pub(super) struct Bound {
 }
 
 /// The inner part of a chain along X, between two curves.
-pub(super) struct Level<'a>(pub(super) &'a Along, pub(super) [Bound; 2]);
+///
+/// This and the two after it hold the move itself: behind a reference its figures would be read again for every node, and
+/// the loops over nodes could not become vectors.
+pub(super) struct Level(pub(super) Along, pub(super) [Bound; 2]);
 
 /// The inner part of a chain in any other direction.
-pub(super) struct Tilted<'a>(pub(super) &'a Along, pub(super) [Bound; 2]);
+pub(super) struct Tilted(pub(super) Along, pub(super) [Bound; 2]);
 
 /// A move with a free end.
-pub(super) struct Free<'a>(pub(super) &'a Along);
+pub(super) struct Free(pub(super) Along);
 
-impl Shape<1> for Level<'_> {
+impl Shape<1> for Level {
     #[inline(always)]
     fn anchor(&self) -> DVec3 {
         self.0.low
@@ -275,7 +278,7 @@ impl Shape<1> for Level<'_> {
     }
 }
 
-impl Shape<2> for Tilted<'_> {
+impl Shape<2> for Tilted {
     #[inline(always)]
     fn anchor(&self) -> DVec3 {
         self.0.low
@@ -298,7 +301,7 @@ impl Shape<2> for Tilted<'_> {
     }
 }
 
-impl Shape<2> for Free<'_> {
+impl Shape<2> for Free {
     #[inline(always)]
     fn anchor(&self) -> DVec3 {
         self.0.low
