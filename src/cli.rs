@@ -2,6 +2,7 @@
 
 mod carve;
 mod check;
+mod checks;
 #[cfg(unix)]
 mod controller;
 mod edit;
@@ -13,6 +14,7 @@ mod new;
 mod observe;
 mod outcome;
 mod ports;
+mod rows;
 mod simulate;
 mod stream;
 mod surfaces;

@@ -40,8 +40,8 @@ pub use surface::{
 };
 pub use types::{
     ArtworkSpec, Backdrop, Background, Combine, Connectivity, CutterShape, CutterSpec, Fit, Follow,
-    Found, FoundLayer, Job, KeepOut, LayerSpec, Machine, Milling, Operation, OperationKind, Origin,
-    Pattern, Place, ReliefSpec, Rgb, Selector, Stepover, Stock, TraceMethod, TraceSpec, Within,
-    Wood,
+    Found, FoundLayer, Job, KeepOut, LayerSpec, Limits, Machine, Milling, Operation, OperationKind,
+    Origin, Pattern, Place, ReliefSpec, Rgb, Selector, Stepover, Stock, TraceMethod, TraceSpec,
+    Within, Wood,
 };
 pub use write::{defaults_table, mesh_template, template};

@@ -41,7 +41,8 @@ mod surfaces;
 
 pub use change::change_png;
 pub use data::{
-    Check, CutterRow, LayerRow, LeftoverRow, Picture, ProgramRow, ReportData, StockFacts,
+    Check, CutterRow, LayerRow, LeftoverRow, LoadRow, Occasion, Picture, ProgramRow, ReportData,
+    StockFacts,
 };
 pub use depth::depth_png;
 pub use deviation::{DeviationScale, deviation_png};

@@ -139,12 +139,47 @@ fn the_job_beside_our_programs_is_found_and_pictures_are_written() {
     let said = String::from_utf8_lossy(&out.stdout);
     assert_eq!(out.status.code(), Some(0), "{}", String::from_utf8_lossy(&out.stderr));
     assert!(said.contains("job beside the programs") && said.contains("passed"), "{said}");
-    let pictures =
-        ["carved.png", "deviation.png", "feeds.png", "paths.png", "sections.png", "steps.png"];
+    let pictures = [
+        "carved.png",
+        "deviation.png",
+        "feeds.png",
+        "paths.png",
+        "relief.png",
+        "sections.png",
+        "steps.png",
+    ];
+    let folder = desk.path().join("1-rough-flat-6-simulated");
     for name in pictures {
-        let file = desk.path().join("1-rough-flat-6-simulated").join(name);
-        assert!(std::fs::read(file).unwrap().starts_with(b"\x89PNG"), "{name}");
+        assert!(std::fs::read(folder.join(name)).unwrap().starts_with(b"\x89PNG"), "{name}");
     }
+    let page = std::fs::read_to_string(folder.join("report.html")).unwrap();
+    assert!(page.contains("Dry run passed") && page.contains("dry run of 2 programs"));
+    assert_eq!(page.matches("src=\"data:image/png;base64,iVBOR").count(), pictures.len());
+}
+
+#[test]
+fn limits_of_the_command_line_fail_just_below_what_is_told() {
+    let lines = program(ROUGH);
+    let (_, json, _) = simulate(ROUGH, &lines, &[]);
+    for (key, flag, kind) in
+        [("chip_load_mm", "--max-chip", "chip-load"), ("engaged_mm", "--max-engaged", "engagement")]
+    {
+        let peak = &json["programs"][0]["extremes"][key];
+        let (value, line) = (peak["value"].as_f64().unwrap(), peak["line"].as_u64().unwrap());
+        let (code, below, err) = simulate(ROUGH, &lines, &[flag, &format!("{}", 0.999 * value)]);
+        assert_eq!(code, 4, "{err}");
+        let found = failures(&below, kind);
+        assert_eq!(found.iter().find(|f| f.0 == ROUGH), Some(&(ROUGH.to_owned(), line)), "{err}");
+        let most = json["programs"].as_array().unwrap().iter();
+        let most = most.filter_map(|p| p["extremes"][key]["value"].as_f64()).fold(0.0, f64::max);
+        let (code, _, err) = simulate(ROUGH, &lines, &[flag, &format!("{}", 1.001 * most)]);
+        assert_eq!(code, 0, "{err}");
+    }
+    let desk = tempfile::tempdir().unwrap();
+    std::fs::write(desk.path().join("a.nc"), "G21G90\nG0Z5\nG1Z-1F100\nX20\nG0Z5\nM2\n").unwrap();
+    let out = relievo(desk.path(), &["simulate", "a.nc", "--cutter", "flat-6", "--max-left", "1"]);
+    assert_eq!(out.status.code(), Some(2), "{out:?}");
+    assert!(String::from_utf8_lossy(&out.stderr).contains("give --target or --job"));
 }
 
 #[test]

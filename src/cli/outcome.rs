@@ -1,14 +1,14 @@
 //! What a carving run hands over: files, report data, JSON, and the words for a run that stops.
 
-use super::Stop;
+use super::{Stop, checks, rows};
 use crate::CarveError;
 use crate::Carving;
 use crate::cutter::Profile;
-use crate::job::{CutterShape, Job, SurfaceSpec};
-use crate::proof::{FailureKind, ProofError, Quantiles};
+use crate::job::{Job, SurfaceSpec};
+use crate::proof::{ProofError, Setup};
 use crate::report::{
-    self, Board, Check, ColorBy, Cut, CutterIn, CutterRow, DeviationScale, LayerRow, LeftoverRow,
-    Look, Picture, ProgramRow, ReportData, ReportError, Sections, Step, StockFacts,
+    self, Board, ColorBy, Cut, CutterIn, DeviationScale, LayerRow, Look, Occasion, Picture,
+    ReportData, ReportError, Sections, Step,
 };
 use crate::toolpath::ToolpathError;
 use rayon::prelude::*;
@@ -169,14 +169,13 @@ fn sections(carving: &Carving, look: Look, title: &str) -> Result<Vec<u8>, Repor
     report::sections_png(&view, look, title)
 }
 
-/// The pictures of the report, the most telling one first.
-fn pictures(files: &[Made]) -> Vec<Picture> {
-    let picture = |name: &str, title: &str, caption: &str| Picture {
-        title: title.into(),
-        caption: caption.into(),
-        png: files.iter().find(|f| f.0 == name).map(|f| f.1.clone()).unwrap_or_default(),
+/// The pictures of the report as far as there are such files, the most telling one first.
+pub(super) fn pictures(files: &[Made]) -> Vec<Picture> {
+    let picture = |name: &str, title: &str, caption: &str| {
+        let (_, png) = files.iter().find(|f| f.0 == name)?;
+        Some(Picture { title: title.into(), caption: caption.into(), png: png.clone() })
     };
-    vec![
+    let all = [
         picture("carved.png", "As carved", "What the dry run of the programs leaves."),
         picture("relief.png", "Design", "The relief that the programs are held against."),
         picture(
@@ -204,7 +203,8 @@ fn pictures(files: &[Made]) -> Vec<Picture> {
             "Toolpaths by feed",
             "Feed moves by the feed asked for; rapids dashed.",
         ),
-    ]
+    ];
+    all.into_iter().flatten().collect()
 }
 
 /// The files that the design was made from.
@@ -224,62 +224,30 @@ fn report_data(carving: &Carving) -> ReportData {
     let job = &design.job;
     let verdict = &carving.verdict;
     let lowest = design.relief.target.range().map_or(0.0, |(low, _)| f64::from(low));
-    let leftover = |place: &str, q: &Quantiles| LeftoverRow {
-        place: place.into(),
-        p50_mm: q.p50_mm,
-        p90_mm: q.p90_mm,
-        p99_mm: q.p99_mm,
-        max_mm: q.max_mm,
-    };
     ReportData {
+        occasion: Occasion::Carving,
         title: job.title.clone(),
         artwork: sources(job),
         machine: job.machine.title.clone(),
-        stock: StockFacts {
-            width_mm: job.stock.width_mm,
-            height_mm: job.stock.height_mm,
-            thickness_mm: job.stock.thickness_mm,
-            wood: job.stock.wood.title.clone(),
-            grain_deg: job.stock.grain_rad.to_degrees(),
-            zero: format!("{}, top of the stock", job.stock.origin.words()),
-            relief_depth_mm: -lowest,
-            pitch_mm: job.relief.pitch_mm,
-        },
+        stock: rows::stock(&job.stock, -lowest, job.relief.pitch_mm),
         layers: layers(carving),
-        cutters: cutters(job),
+        cutters: rows::cutters(job.operations.iter().map(|o| &o.cutter)),
         programs: carving
             .paths
             .iter()
             .zip(&verdict.programs)
-            .map(|(path, p)| ProgramRow {
-                file: p.name.clone(),
-                cutter: path.cutter.name.clone(),
-                spindle_rpm: path.spindle_rpm,
-                feed_mm_per_min: job
-                    .operations
-                    .iter()
-                    .filter(|o| o.cutter == path.cutter)
-                    .map(|o| o.feed_mm_per_min)
-                    .fold(0.0, f64::max),
-                lines: p.lines as usize,
-                lines_per_s: p.flow.lines_per_s,
-                reached_mm_per_min: p.flow.reached_mm_per_min,
-                cutting_mm: p.cutting_mm,
-                air_mm: p.air_mm,
-                air_s: p.air_s,
-                rapid_s: p.times.rapid_s,
-                retracts: p.retracts,
-                deepest_mm: p.lowest_mm,
-                time_s: p.seconds,
+            .map(|(path, p)| {
+                let own = job.operations.iter().filter(|o| o.cutter == path.cutter);
+                let feed_mm_per_min = own.map(|o| o.feed_mm_per_min).fold(0.0, f64::max);
+                rows::program(p, path.spindle_rpm, feed_mm_per_min)
             })
             .collect(),
+        loads: verdict.programs.iter().map(rows::load).collect(),
         passed: verdict.passed(),
-        checks: checks(carving),
-        leftover: vec![
-            leftover("everywhere", &verdict.leftover.all),
-            leftover(&verdict.leftover.within_reach(), &verdict.leftover.reachable),
-            leftover("where only a smaller cutter would", &verdict.leftover.unreachable),
-        ],
+        findings: verdict.failures.iter().map(ToString::to_string).collect(),
+        checks: checks::of(verdict, &Setup::from(job), true),
+        leftover: rows::leftover(&verdict.leftover),
+        finer: Vec::new(),
         notes: carving.notes.clone(),
         pictures: Vec::new(),
     }
@@ -309,107 +277,6 @@ fn layers(carving: &Carving) -> Vec<LayerRow> {
         height_mm: spec.height_mm,
     })
     .collect()
-}
-
-fn cutters(job: &Job) -> Vec<CutterRow> {
-    let mut rows: Vec<CutterRow> = Vec::new();
-    for cutter in job.operations.iter().map(|o| &o.cutter) {
-        if rows.iter().any(|r| r.name == cutter.name) {
-            continue;
-        }
-        rows.push(CutterRow {
-            name: cutter.name.clone(),
-            shape: form(&cutter.shape),
-            diameter_mm: cutter.diameter_mm,
-            flutes: cutter.flutes,
-            flute_mm: cutter.flute_mm,
-            stickout_mm: cutter.stickout_mm,
-        });
-    }
-    rows
-}
-
-/// The form of a cutting end, for people.
-fn form(shape: &CutterShape) -> String {
-    // Degrees that were written with decimals come back through radians.
-    let degrees = |radians: f64| (radians.to_degrees() * 1e6).round() / 1e6;
-    match *shape {
-        CutterShape::Flat => "flat end".to_owned(),
-        CutterShape::Ball => "ball nose".to_owned(),
-        CutterShape::Bull { corner_mm } => format!("bull nose, corner {corner_mm} mm"),
-        CutterShape::V { angle_rad, tip_mm: 0.0 } => format!("V, {} degrees", degrees(angle_rad)),
-        CutterShape::V { angle_rad, tip_mm } => {
-            format!("V, {} degrees, tip {tip_mm} mm", degrees(angle_rad))
-        }
-        CutterShape::Tapered { tip_mm, taper_rad } => {
-            format!("tapered ball, tip {tip_mm} mm, {} degrees per side", degrees(taper_rad))
-        }
-        CutterShape::Table { .. } => "profile of its own".to_owned(),
-    }
-}
-
-/// What was checked and what was found, one line each.
-fn checks(carving: &Carving) -> Vec<Check> {
-    use FailureKind as K;
-    let job = &carving.design.job;
-    let verdict = &carving.verdict;
-    let gouge = verdict.gouge.as_ref();
-    let deepest = gouge.map_or("none".to_string(), |g| {
-        format!("deepest {:.4} mm at X{:.2} Y{:.2}", g.depth_mm, g.at.x, g.at.y)
-    });
-    let flute = verdict.programs.iter().map(|p| p.engaged_mm).fold(0.0, f64::max);
-    let over = format!(
-        "{:.3} % of the area, at most {:.3} mm",
-        verdict.leftover.over_fraction * 100.0,
-        verdict.leftover.over_max_mm
-    );
-    let limit = job.tolerance.scallop_mm + job.tolerance.gouge_mm;
-    let mut rows = vec![
-        (format!("no gouge deeper than {} mm", job.tolerance.gouge_mm), vec![K::Gouge], deepest),
-        (
-            "no rapid in wood".into(),
-            vec![K::RapidInWood, K::LowRapid, K::BlindStart],
-            "none".into(),
-        ),
-        ("no plunge in wood faster than its limit".into(), vec![K::Plunge], "none".into()),
-        (
-            "flutes, shank and collet clear of wood".into(),
-            vec![K::Flute, K::Shank, K::Holder],
-            format!("deepest cut {flute:.2} mm"),
-        ),
-        (
-            "inside the machine's travel and the stock".into(),
-            vec![K::Travel, K::OutsideStock, K::ThroughBottom],
-            "inside".into(),
-        ),
-        (
-            "feeds and spindle within limits".into(),
-            vec![
-                K::Feed,
-                K::SpindleSpeed,
-                K::SpindleReversed,
-                K::SpindleOff,
-                K::NoDwell,
-                K::EndInWood,
-                K::NoEnd,
-            ],
-            "within".into(),
-        ),
-        ("second oracle agrees".into(), vec![K::Oracles], "agrees".into()),
-    ];
-    if job.strict {
-        rows.push((
-            format!("no leftover above {limit} mm where cutters reach"),
-            vec![K::Leftover],
-            over,
-        ));
-    }
-    rows.into_iter()
-        .map(|(name, kinds, fine)| {
-            let bad = verdict.failures.iter().find(|f| kinds.contains(&f.kind));
-            Check { name, passed: bad.is_none(), found: bad.map_or(fine, |f| f.sentence.clone()) }
-        })
-        .collect()
 }
 
 /// The result for scripts.

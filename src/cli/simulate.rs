@@ -2,6 +2,7 @@
 
 mod header;
 mod place;
+mod shown;
 mod told;
 
 use super::Stop;
@@ -11,11 +12,7 @@ use crate::cutter::Profile;
 use crate::geom::{DVec2, DVec3};
 use crate::offset;
 use crate::proof::{self, Verdict, Wanted};
-use crate::report::{
-    self, Board, ColorBy, Cut, CutterIn, DeviationScale, Look, ReportError, Sections, Step,
-};
 use place::Ready;
-use rayon::prelude::*;
 use std::path::PathBuf;
 
 #[derive(Debug, clap::Args)]
@@ -61,6 +58,22 @@ pub(super) struct Args {
     /// Where the work zero lies in machine coordinates, as `?` and `$#` tell it: checks the soft limits
     #[arg(long, value_name = "X,Y,Z", value_parser = point, allow_hyphen_values = true)]
     zero: Option<DVec3>,
+
+    /// Deepest cut into the target that passes, mm (default: gouge tolerance of the job, or 0.01)
+    #[arg(long, value_name = "MM", value_parser = limit)]
+    max_gouge: Option<f64>,
+
+    /// Most wood left where the cutters reach that passes, mm (default: by the job's limits)
+    #[arg(long, value_name = "MM", value_parser = limit)]
+    max_left: Option<f64>,
+
+    /// Highest wood above the tip of a cutting move that passes, mm (default: by the job's limits)
+    #[arg(long, value_name = "MM", value_parser = limit)]
+    max_engaged: Option<f64>,
+
+    /// Thickest chip of a tooth that passes, mm (default: by the job's limits)
+    #[arg(long, value_name = "MM", value_parser = limit)]
+    max_chip: Option<f64>,
 
     /// Distance of the virtual stock's nodes, mm
     #[arg(long, value_name = "MM", value_parser = pitch)]
@@ -111,6 +124,31 @@ pub(super) struct Args {
     quiet: bool,
 }
 
+impl Args {
+    /// Limits of the command line go before those of the job.
+    fn set_limits(&self, ready: &mut Ready) -> Result<(), Stop> {
+        if ready.target.is_none() && (self.max_gouge.is_some() || self.max_left.is_some()) {
+            return Err(Stop::Usage(
+                "--max-gouge and --max-left need to know what the wood should become; give --target or --job"
+                    .to_owned(),
+            ));
+        }
+        let setup = &mut ready.setup;
+        if let Some(gouge_mm) = self.max_gouge {
+            setup.tolerance.gouge_mm = gouge_mm;
+        }
+        let limits = &mut setup.limits;
+        for (given, limit) in [
+            (self.max_left, &mut limits.leftover_mm),
+            (self.max_engaged, &mut limits.engaged_mm),
+            (self.max_chip, &mut limits.chip_load_mm),
+        ] {
+            *limit = given.or(*limit);
+        }
+        Ok(())
+    }
+}
+
 /// What a simulation found.
 #[derive(Debug)]
 struct Simulated {
@@ -123,7 +161,8 @@ struct Simulated {
 pub(super) fn run(args: &Args) -> Result<(), Stop> {
     let stages = Stages::new(args.quiet);
     stages.enter("read");
-    let ready = place::prepare(args, &mut |stage| stages.enter(stage))?;
+    let mut ready = place::prepare(args, &mut |stage| stages.enter(stage))?;
+    args.set_limits(&mut ready)?;
     super::memory::check_nodes(ready.grid.len(), ready.grid.pitch_mm)?;
     let folder = args.out.clone().unwrap_or_else(|| default_folder(args));
     let mut outputs = if args.dry { None } else { Some(Outputs::prepare(&folder)?) };
@@ -136,7 +175,7 @@ pub(super) fn run(args: &Args) -> Result<(), Stop> {
     let done = Simulated { ready, verdict, would_reach };
     if let Some(outputs) = &mut outputs {
         stages.enter("pictures");
-        for (name, bytes) in pictures(&done, args.meshes)? {
+        for (name, bytes) in shown::files(&done, args.meshes)? {
             outputs.add(&name, &bytes)?;
         }
     }
@@ -156,9 +195,6 @@ pub(super) fn run(args: &Args) -> Result<(), Stop> {
     }
     if passed { Ok(()) } else { Err(Stop::CheckFailed(told::failures(&done.verdict))) }
 }
-
-/// Programs with more parts than this get no picture of what each of them removed.
-const MOST_STEPS: usize = 16;
 
 /// Which smaller cutters of the library would come where those of the programs do not, the best ones first.
 fn would_reach(ready: &Ready) -> Vec<(String, f64)> {
@@ -183,93 +219,6 @@ fn would_reach(ready: &Ready) -> Vec<(String, f64)> {
         .collect();
     gains.sort_by(|a, b| b.1.total_cmp(&a.1));
     gains
-}
-
-/// Makes the bytes of one file.
-type Make<'a> = dyn Fn() -> Result<Vec<u8>, ReportError> + Sync + 'a;
-
-fn pictures(done: &Simulated, meshes: bool) -> Result<Vec<(String, Vec<u8>)>, ReportError> {
-    let Simulated { ready, verdict, .. } = done;
-    let (stock, carved) = (&ready.setup.stock, &verdict.carved);
-    let wood = Look::of_wood(&stock.wood.name, stock.grain_rad);
-    let title = |what: &str| format!("{} - {what}", ready.title);
-    let paths: Vec<_> =
-        ready.parts.iter().map(|p| (p.name.as_str(), p.program.moves.as_slice())).collect();
-    let tolerance = &ready.setup.tolerance;
-    let limits = DeviationScale { gouge_mm: tolerance.gouge_mm, scallop_mm: tolerance.scallop_mm };
-    let board = Board { bounds: stock.bounds(), top: Some(carved) };
-    let paths_by = |by: ColorBy, what: &str| report::paths_png(&paths, board, by, &title(what));
-    let mut jobs: Vec<(&str, Box<Make>)> = vec![
-        ("carved.png", Box::new(|| report::shaded_png(carved, wood, Some(&title("as carved"))))),
-        ("paths.png", Box::new(|| paths_by(ColorBy::Depth, "toolpaths by depth"))),
-        ("feeds.png", Box::new(|| paths_by(ColorBy::Feed, "toolpaths by feed"))),
-        ("sections.png", Box::new(|| sections(done, wood, &title("cross-sections")))),
-        ("carved-depth.png", Box::new(|| report::depth_png(carved))),
-    ];
-    if ready.parts.len() <= MOST_STEPS {
-        jobs.push((
-            "steps.png",
-            Box::new(|| steps(done, wood, &title("before and after each cutter"))),
-        ));
-    }
-    if ready.target.is_some() {
-        jobs.push((
-            "deviation.png",
-            Box::new(|| {
-                let (title, out) = (title("deviation of the dry run"), &verdict.unreachable);
-                report::deviation_png(&verdict.deviation, Some(out), carved, limits, &title)
-            }),
-        ));
-    }
-    if meshes {
-        let base = -stock.thickness_mm;
-        let nth = report::mesh_every_nth_node(carved.grid());
-        jobs.push(("carved.stl", Box::new(move || report::stl(carved, base, nth))));
-        jobs.push(("carved.obj", Box::new(move || report::obj(carved, base, nth))));
-    }
-    jobs.par_iter().map(|(name, make)| Ok(((*name).to_owned(), make()?))).collect()
-}
-
-/// The stock before and after each part.
-fn steps(done: &Simulated, look: Look, title: &str) -> Result<Vec<u8>, ReportError> {
-    let parts = &done.ready.parts;
-    let profiles: Vec<Profile> = parts.iter().map(|p| Profile::of(&p.cutter)).collect();
-    let runs: Vec<_> =
-        profiles.iter().zip(parts).map(|(p, part)| (p, part.program.moves.as_slice())).collect();
-    let stages = report::stages(&done.ready.setup.stock, &done.ready.grid, &runs);
-    let steps: Vec<Step<'_>> = parts
-        .iter()
-        .zip(stages.windows(2))
-        .map(|(part, stage)| Step {
-            name: &part.name,
-            cutter: &part.cutter.name,
-            before: &stage[0],
-            after: &stage[1],
-        })
-        .collect();
-    report::steps_png(&steps, look, title)
-}
-
-/// Cross-sections along the lines asked for, else through the worst place, or the deepest one.
-fn sections(done: &Simulated, look: Look, title: &str) -> Result<Vec<u8>, ReportError> {
-    let Simulated { ready, verdict, .. } = done;
-    let stock = &ready.setup.stock;
-    let profile = ready.parts.last().map(|p| (&p.cutter.name, Profile::of(&p.cutter)));
-    let has_target = ready.target.is_some();
-    let cuts = if ready.cuts.is_empty() {
-        Cut::through_worst(&stock.bounds(), &verdict.deviation, &ready.grid).to_vec()
-    } else {
-        ready.cuts.clone()
-    };
-    let view = Sections {
-        carved: &verdict.carved,
-        design: ready.target.as_ref(),
-        deviation: has_target.then_some(&verdict.deviation),
-        thickness_mm: stock.thickness_mm,
-        cutter: profile.as_ref().map(|(name, profile)| CutterIn { name, profile }),
-        cuts: &cuts,
-    };
-    report::sections_png(&view, look, title)
 }
 
 /// `dir/part.nc` -> `dir/part-simulated`.
@@ -340,6 +289,13 @@ fn numbers(text: &str) -> Vec<f64> {
         parts.into_iter().flatten().collect()
     } else {
         Vec::new()
+    }
+}
+
+fn limit(text: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(v) if (0.0005..=200.0).contains(&v) => Ok(v),
+        _ => Err("give a figure from 0.0005 to 200 mm".to_owned()),
     }
 }
 

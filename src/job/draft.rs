@@ -7,8 +7,8 @@ use toml::de::{DeTable, DeValue};
 use super::error::{JobError, Source, shown};
 use super::group::{GroupSpec, read_groups};
 use super::keys::{
-    ARTWORK, AT, BACKGROUND, GROUP, KEEP_OUT, LAYER, MACHINE, OPERATION, ORIGINS, RELIEF, SAFETY,
-    STOCK, TOLERANCE, TOP, TRACE, TRACE_METHODS, WOOD, rule,
+    ARTWORK, AT, BACKGROUND, GROUP, KEEP_OUT, LAYER, LIMITS, MACHINE, OPERATION, ORIGINS, RELIEF,
+    SAFETY, STOCK, TOLERANCE, TOP, TRACE, TRACE_METHODS, WOOD, rule,
 };
 use super::layer::{LayerDraft, read_layer};
 use super::library::{Library, read_machine, read_machine_file, read_wood};
@@ -16,7 +16,7 @@ use super::operation::{KindDraft, OperationDraft, default_operations, read_opera
 use super::reader::{Table, as_number};
 use super::selector::read_color;
 use super::types::{
-    ArtworkSpec, Backdrop, Connectivity, Fit, KeepOut, Machine, Origin, Place, TraceMethod,
+    ArtworkSpec, Backdrop, Connectivity, Fit, KeepOut, Limits, Machine, Origin, Place, TraceMethod,
     TraceSpec, Wood,
 };
 use crate::geom::{DVec2, DVec3, Tolerance};
@@ -35,6 +35,7 @@ pub struct Draft {
     pub(super) depth_mm: f64,
     pub(super) background: BackgroundDraft,
     pub(super) tolerance: Tolerance,
+    pub(super) limits: Limits,
     pub(super) safe_z_mm: f64,
     pub(super) clearance_mm: f64,
     pub(super) keep_outs: Vec<KeepOut>,
@@ -140,6 +141,7 @@ fn read(
     let relief = or_empty("relief", &RELIEF)?;
     let tolerance = or_empty("tolerance", &TOLERANCE)?;
     let safety = or_empty("safety", &SAFETY)?;
+    let limits = or_empty("limits", &LIMITS)?;
     let layers = top.tables("layer", &LAYER)?;
     let groups = top.tables("group", &GROUP)?;
     let operations = top.tables("operation", &OPERATION)?;
@@ -170,6 +172,11 @@ fn read(
         depth_mm: relief.sure_number("depth_mm"),
         background: read_background(&relief)?,
         tolerance: read_tolerance(&tolerance, &operations)?,
+        limits: Limits {
+            leftover_mm: limits.number("leftover_mm"),
+            engaged_mm: limits.number("engaged_mm"),
+            chip_load_mm: limits.number("chip_load_mm"),
+        },
         safe_z_mm: safety.sure_number("safe_z_mm"),
         clearance_mm: safety.sure_number("clearance_mm"),
         ramp_rad: safety.sure_number("ramp_deg").to_radians(),
@@ -194,6 +201,13 @@ fn read(
         let name = if safety.raw("clearance_mm").is_some() { "clearance_mm" } else { "safe_z_mm" };
         let help = "rapids travel at safe_z_mm and go down to clearance_mm above the wood";
         return Err(safety.impossible(name, &message, "", help));
+    }
+    let scallop_mm = draft.tolerance.scallop_mm;
+    if let Some(left_mm) = draft.limits.leftover_mm.filter(|left_mm| *left_mm < scallop_mm) {
+        let message =
+            format!("leftover_mm {left_mm} is less than the cusps that are planned, {scallop_mm}");
+        let help = format!("lower tolerance.scallop_mm to {left_mm} or less, or raise leftover_mm");
+        return Err(limits.impossible("leftover_mm", &message, "", &help));
     }
     for (zone, table) in draft.keep_outs.iter().zip(&keep_outs) {
         let needs = zone.top_mm + draft.clearance_mm;

@@ -243,7 +243,7 @@ use Fallback::{Flag, Number, Required, Rule, Text};
 const PART: Kind = Kind::Number { min: 0.0, max: 1.0, unit: "" };
 
 /// The sections of a job, in the order in which they are written out.
-pub(super) static JOB: [&Section; 17] = [
+pub(super) static JOB: [&Section; 18] = [
     &TOP,
     &STOCK,
     &ARTWORK,
@@ -251,6 +251,7 @@ pub(super) static JOB: [&Section; 17] = [
     &RELIEF,
     &TOLERANCE,
     &SAFETY,
+    &LIMITS,
     &KEEP_OUT,
     &LAYER,
     &SURFACE,
@@ -294,6 +295,12 @@ pub(super) static TOP: Section = Section {
         key("relief", Kind::Forms("a [relief] table"), Rule("as below"), "the heightfield"),
         key("tolerance", Kind::Forms("a [tolerance] table"), Rule("as below"), "small numbers"),
         key("safety", Kind::Forms("a [safety] table"), Rule("as below"), "travel above the wood"),
+        key(
+            "limits",
+            Kind::Forms("a [limits] table"),
+            Rule("none"),
+            "what else the dry run must not find",
+        ),
         key(
             "keep_out",
             Kind::Forms("[[keep_out]] tables"),
@@ -581,6 +588,31 @@ pub(super) static SAFETY: Section = Section {
         key("ramp_deg", deg(0.5, 30.0), Number(5.0), "steepest entry into wood"),
     ],
 };
+
+/// `[limits]`
+pub(super) static LIMITS: Section = Section {
+    name: "limits",
+    header: "[limits]",
+    doc: "figures of the dry run that fail the proof; those not given are only told",
+    keys: &[
+        key(
+            "leftover_mm",
+            mm(0.001, 100.0),
+            Rule(NO_LIMIT),
+            "most wood left above what the cutters reach",
+        ),
+        key(
+            "engaged_mm",
+            mm(0.01, 200.0),
+            Rule(NO_LIMIT),
+            "highest wood above the tip where a move cuts",
+        ),
+        key("chip_load_mm", mm(0.001, 5.0), Rule(NO_LIMIT), "thickest chip of a tooth"),
+    ],
+};
+
+/// In the place of a limit.
+const NO_LIMIT: &str = "none: told, not judged";
 
 /// `[[keep_out]]`
 pub(super) static KEEP_OUT: Section = Section {

@@ -96,6 +96,7 @@ impl Draft {
             operations,
             keep_outs: self.keep_outs.clone(),
             tolerance: self.tolerance,
+            limits: self.limits,
             safe_z_mm: self.safe_z_mm,
             clearance_mm: self.clearance_mm,
             ramp_rad: self.ramp_rad,

@@ -174,6 +174,20 @@ fn the_whole_example_is_read() {
     assert_eq!(job.operations[1].kind, raster);
 }
 
+/// Limits are read, come back as written, and are none where nothing is said.
+#[test]
+fn limits_are_read_and_written() {
+    let text = with("[limits]\nleftover_mm = 0.02\nchip_load_mm = 0.05\n");
+    let read = draft(&text).unwrap().settle(&found()).unwrap();
+    let limits = Limits { leftover_mm: Some(0.02), engaged_mm: None, chip_load_mm: Some(0.05) };
+    assert_eq!(read.limits, limits);
+    let written = read.to_toml();
+    assert!(written.contains("[limits]\nleftover_mm = 0.02\nchip_load_mm = 0.05\n"), "{written}");
+    let none = draft(&with("")).unwrap().settle(&found()).unwrap();
+    assert_eq!(none.limits, Limits::default());
+    assert!(!none.to_toml().contains("[limits]"));
+}
+
 /// The cusps that may be left are those of the last finishing, unless the job says something else.
 #[test]
 fn the_scallop_tolerance_follows_the_finishing() {

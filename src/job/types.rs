@@ -32,6 +32,8 @@ pub struct Job {
     pub keep_outs: Vec<KeepOut>,
     /// The small numbers that the user owns.
     pub tolerance: Tolerance,
+    /// What else fails the proof.
+    pub limits: Limits,
     /// Height of rapid travel above the stock's top, mm.
     pub safe_z_mm: f64,
     /// Gap kept above the wood where a rapid down ends and a feed begins, mm.
@@ -48,6 +50,17 @@ pub struct Job {
     pub artwork_size_mm: DVec2,
     /// What was decided for the user and what looks odd, in plain sentences.
     pub notes: Vec<String>,
+}
+
+/// Figures of the dry run that fail the proof where they are higher; `None`: told, not judged.
+#[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize)]
+pub struct Limits {
+    /// Wood left above what the cutters reach, mm.
+    pub leftover_mm: Option<f64>,
+    /// Wood above the tip where a move cuts, mm.
+    pub engaged_mm: Option<f64>,
+    /// Chip of a tooth, mm.
+    pub chip_load_mm: Option<f64>,
 }
 
 /// What the artwork holds, as far as the job needs to know; in units of the file.

@@ -8,8 +8,9 @@ use super::error::JobError;
 use super::group::{GroupSpec, users_of};
 use super::keys::{
     ARTWORK, BACKGROUND, CONTROLS, CREST, CREST_ENDS, CUTTER, EDIT, FOLLOWS, Fallback, GROUP, JOB,
-    JOINS, LAYER, MACHINE, MILLINGS, OPERATION, ORIGINS, PATTERNS, PROFILES, PRUNES, RELIEF,
-    SAFETY, SPLITS, STOCK, SURFACE, Section, TOLERANCE, TOP, TRACE, TRACE_METHODS, WOOD, rule,
+    JOINS, LAYER, LIMITS, MACHINE, MILLINGS, OPERATION, ORIGINS, PATTERNS, PROFILES, PRUNES,
+    RELIEF, SAFETY, SPLITS, STOCK, SURFACE, Section, TOLERANCE, TOP, TRACE, TRACE_METHODS, WOOD,
+    rule,
 };
 use super::library::Library;
 use super::mesh::mesh_lines;
@@ -17,8 +18,8 @@ use super::smooth::smooth_lines;
 use super::surface::{CourseSpec, DrawnCrestSpec, DrawnSpec, Prune, SkeletonSpec, SurfaceSpec};
 use super::types::{
     Backdrop, Background, Connectivity, CutterShape, CutterSpec, Fit, Found, Job, LayerSpec,
-    Machine, Milling, Operation, OperationKind, Origin, Pattern, Place, Stepover, TraceSpec,
-    Within, Wood,
+    Limits, Machine, Milling, Operation, OperationKind, Origin, Pattern, Place, Stepover,
+    TraceSpec, Within, Wood,
 };
 use crate::geom::{DVec2, DVec3};
 
@@ -52,6 +53,10 @@ impl Job {
         section("[relief]", &relief_lines(self));
         section("[tolerance]", &tolerance_lines(self));
         section("[safety]", &safety_lines(self));
+        let limits = limit_lines(self);
+        if !limits.is_empty() {
+            section("[limits]", &limits);
+        }
         for zone in &self.keep_outs {
             let lines = [
                 ("x_mm", number(zone.at.x)),
@@ -148,6 +153,7 @@ fn page_of(job: &Job, found: &Found) -> String {
     page.section(&RELIEF, &relief_lines(job), &[]);
     page.section(&TOLERANCE, &tolerance_lines(job), &[]);
     page.section(&SAFETY, &safety_lines(job), &[]);
+    page.section(&LIMITS, &limit_lines(job), &[]);
     let mm = job.artwork_unit_mm;
     for (index, (layer, found)) in job.layers.iter().zip(&found.layers).enumerate() {
         let lines = layer_lines(layer, job.artwork.is_picture());
@@ -383,6 +389,14 @@ fn safety_lines(job: &Job) -> Vec<Line> {
         ("clearance_mm", number(job.clearance_mm)),
         ("ramp_deg", degrees(job.ramp_rad)),
     ]
+}
+
+fn limit_lines(job: &Job) -> Vec<Line> {
+    let Limits { leftover_mm, engaged_mm, chip_load_mm } = job.limits;
+    [("leftover_mm", leftover_mm), ("engaged_mm", engaged_mm), ("chip_load_mm", chip_load_mm)]
+        .into_iter()
+        .filter_map(|(key, value)| Some((key, number(value?))))
+        .collect()
 }
 
 fn surface_lines(surface: &SurfaceSpec, of_picture: bool) -> Vec<Line> {

@@ -48,7 +48,7 @@ pub struct Leftover {
     /// than 1.5 pitches (steep flanks and walls) are left out. A cutter may come less near between two nodes than at them
     /// (along a rim that the grid makes stairs of).
     pub between_mm: f64,
-    /// Fraction of all nodes where more than scallop + gouge is left above what the cutters reach.
+    /// Fraction of all nodes where more than [`Setup::leftover_limit_mm`] is left above what the cutters reach.
     pub over_fraction: f64,
     /// The most that is left above what the cutters reach at such nodes, mm; 0 where there are none.
     pub over_max_mm: f64,
@@ -159,7 +159,7 @@ pub(super) fn hold(
     let grid = *target.grid();
     let (terrain, reached) = (Terrain::new(target), Terrain::new(reach));
     let tolerance = setup.tolerance;
-    let limit = tolerance.scallop_mm + tolerance.gouge_mm;
+    let limit = setup.leftover_limit_mm();
     let stock = setup.stock.bounds().grown(1e-9);
     let mut deviation = vec![0.0_f32; grid.len()];
     let mut unreachable = vec![false; grid.len()];
@@ -311,10 +311,10 @@ fn judge_walls(
     deepest
 }
 
-/// A strict job answers for every node that its cutters reach.
+/// A strict job, or one with a limit, answers for every node that its cutters reach.
 pub(super) fn judge_leftover(held: &Held, setup: &Setup, ledger: &mut Ledger) {
-    if let (true, Some(spot)) = (setup.strict, held.over.worst) {
-        let limit = setup.tolerance.scallop_mm + setup.tolerance.gouge_mm;
+    if let (true, Some(spot)) = (setup.judges_leftover(), held.over.worst) {
+        let limit = setup.leftover_limit_mm();
         let (kind, amount, at) = (FailureKind::Leftover, spot.amount, spot.at);
         let finding = Finding { kind, program: "", line: 0, at, amount, limit };
         ledger.note(finding, held.over.count);

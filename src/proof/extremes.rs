@@ -35,29 +35,39 @@ impl Extremes {
     /// Those of a part whose moves met `contacts`.
     pub(super) fn of(part: &Part, contacts: &[Contact], down: impl Fn(&Move) -> f64) -> Self {
         let mut found = Self::default();
-        let mut rpm = 0.0;
-        let mut events = part.program.events.iter().peekable();
-        for (k, (m, c)) in part.program.moves.iter().zip(contacts).enumerate() {
-            while let Some(e) = events.next_if(|e| e.at_move <= k) {
-                match e.kind {
-                    EventKind::SpindleOn { rpm: new, .. } => rpm = new,
-                    EventKind::SpindleOff | EventKind::End => rpm = 0.0,
-                    _ => {}
-                }
-            }
-            if c.deepest_mm <= IN_WOOD_MM {
-                continue;
-            }
+        for (m, c, chip_mm) in bites(part, contacts) {
             raise(&mut found.thickest_mm, f64::from(c.deepest_mm), m.line);
             raise(&mut found.engaged_mm, f64::from(c.engaged_mm), m.line);
             raise(&mut found.plunge_mm_per_min, down(m), m.line);
-            if let (MoveKind::Feed { feed_mm_per_min }, true) = (m.kind, rpm > 0.0) {
-                let tooth_mm = feed_mm_per_min / (rpm * f64::from(part.cutter.flutes.max(1)));
-                raise(&mut found.chip_load_mm, f64::from(c.chip) * tooth_mm, m.line);
-            }
+            raise(&mut found.chip_load_mm, chip_mm, m.line);
         }
         found
     }
+}
+
+/// The moves of a part that take wood, what each met, and its thickest chip, mm (0 where the spindle stands).
+pub(super) fn bites<'a>(
+    part: &'a Part,
+    contacts: &'a [Contact],
+) -> impl Iterator<Item = (&'a Move, &'a Contact, f64)> {
+    let mut rpm = 0.0;
+    let mut events = part.program.events.iter().peekable();
+    part.program.moves.iter().zip(contacts).enumerate().filter_map(move |(k, (m, c))| {
+        while let Some(e) = events.next_if(|e| e.at_move <= k) {
+            match e.kind {
+                EventKind::SpindleOn { rpm: new, .. } => rpm = new,
+                EventKind::SpindleOff | EventKind::End => rpm = 0.0,
+                _ => {}
+            }
+        }
+        let chip_mm = match m.kind {
+            MoveKind::Feed { feed_mm_per_min } if rpm > 0.0 => {
+                f64::from(c.chip) * feed_mm_per_min / (rpm * f64::from(part.cutter.flutes.max(1)))
+            }
+            _ => 0.0,
+        };
+        (c.deepest_mm > IN_WOOD_MM).then_some((m, c, chip_mm))
+    })
 }
 
 fn raise(peak: &mut Option<Peak>, value: f64, line: u32) {

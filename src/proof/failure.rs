@@ -48,7 +48,11 @@ pub enum FailureKind {
     EndInWood,
     /// The program does not end with the spindle off and M2 or M30.
     NoEnd,
-    /// Too much wood is left where a cutter reaches (a strict job only).
+    /// A move cuts where more wood stands above the tip than the job's limit.
+    Engagement,
+    /// A chip is thicker than the job's limit.
+    ChipLoad,
+    /// Too much wood is left where a cutter reaches (a strict job, or one with a limit).
     Leftover,
     /// The replay and the second oracle disagree: a fault of this program, not of the G-code.
     Oracles,
@@ -213,6 +217,13 @@ fn sentence(f: &Failure) -> String {
         FailureKind::NoEnd => {
             "does not end with M5 and M2 or M30; it may be cut short, so write it again".to_owned()
         }
+        FailureKind::Engagement => format!(
+            "cuts where {a:.2} mm of wood stand above the tip (the limit is {l:.2}); take less in one pass"
+        ),
+        FailureKind::ChipLoad => format!(
+            "chips of {a:.3} mm a tooth (the limit is {l:.3}); lower the feed, raise the spindle speed or \
+             take less in one pass"
+        ),
         FailureKind::Leftover => format!(
             "{a:.3} mm of wood are left above what the cutters reach ({l:.3} allowed); \
              take a smaller stepover or add a finishing pass"

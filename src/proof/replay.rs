@@ -1,12 +1,12 @@
 //! Carves a fresh blank with the parts of the programs and checks every move against machine, cutter and wood.
 
-use super::extremes::Extremes;
+use super::extremes::{Extremes, bites};
 use super::failure::{FailureKind, Finding, Ledger};
 use super::{Manners, Part, ProgramReport, ProofError, Setup, time};
 use crate::cutter::Profile;
 use crate::gcode::read::{EventKind, Program};
 use crate::geom::{Bounds, DVec2, DVec3, Grid, Heightfield, Move, MoveKind};
-use crate::job::Operation;
+use crate::job::{Limits, Operation};
 use crate::motion::Planner;
 use crate::stock::{Block, Contact};
 use std::ops::Range;
@@ -36,6 +36,9 @@ const RPM_SLACK: f64 = 0.5;
 /// Slack for speeds and lengths that three decimals in the text may add.
 const SPEED_SLACK: f64 = 1.005;
 const LENGTH_SLACK_MM: f64 = 1e-3;
+
+/// A figure passes a limit when it is this many times the limit: contacts are stored in single precision.
+const LIMIT_SLACK: f64 = 1.0 + 1e-5;
 
 /// What the replay leaves.
 pub(super) struct Replay {
@@ -148,6 +151,7 @@ impl Case<'_> {
             self.check_place(m);
         }
         self.check_spindle(&contacts);
+        self.check_limits(&contacts);
         let planner = self.run_planner();
         let (times, seconds) = (planner.times(), planner.seconds_by_move());
         let length = |rapid: bool| {
@@ -471,6 +475,21 @@ impl Case<'_> {
             let out = (stock.min - p.truncate()).max(p.truncate() - stock.max).max(DVec2::ZERO);
             if out.length() > OUTSIDE_MM {
                 self.fail(FailureKind::OutsideStock, m.line, p, out.length(), OUTSIDE_MM);
+            }
+        }
+    }
+
+    /// What the job lets a move meet.
+    fn check_limits(&mut self, contacts: &[Contact]) {
+        let Limits { engaged_mm, chip_load_mm, .. } = self.setup.limits;
+        for (m, c, chip_mm) in bites(self.part, contacts) {
+            for (kind, amount, limit) in [
+                (FailureKind::Engagement, f64::from(c.engaged_mm), engaged_mm),
+                (FailureKind::ChipLoad, chip_mm, chip_load_mm),
+            ] {
+                if let Some(limit) = limit.filter(|limit| amount > limit * LIMIT_SLACK) {
+                    self.fail(kind, m.line, m.to, amount, limit);
+                }
             }
         }
     }

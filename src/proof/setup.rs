@@ -1,7 +1,7 @@
 //! What programs run on, and by whose rules they are judged.
 
 use crate::geom::{DVec3, Tolerance};
-use crate::job::{Job, KeepOut, Machine, Operation, Stock};
+use crate::job::{Job, KeepOut, Limits, Machine, Operation, Stock};
 
 /// What programs run on, and what they may do.
 #[derive(Debug, Clone)]
@@ -18,6 +18,8 @@ pub struct Setup {
     pub safe_z_mm: f64,
     /// Gap kept above the wood by rapids below the safe height, mm.
     pub clearance_mm: f64,
+    /// What else is a failure.
+    pub limits: Limits,
     /// When true, leftover above scallop + gouge where a cutter reaches is a failure.
     pub strict: bool,
     /// What may be done with each cutter: feed, plunge, spindle speed.
@@ -55,6 +57,18 @@ impl Manners {
     }
 }
 
+impl Setup {
+    /// More than this left above what the cutters reach counts as too much, mm.
+    pub fn leftover_limit_mm(&self) -> f64 {
+        self.limits.leftover_mm.unwrap_or(self.tolerance.scallop_mm + self.tolerance.gouge_mm)
+    }
+
+    /// True where that fails the proof.
+    pub fn judges_leftover(&self) -> bool {
+        self.strict || self.limits.leftover_mm.is_some()
+    }
+}
+
 impl From<&Job> for Setup {
     fn from(job: &Job) -> Self {
         Self {
@@ -62,6 +76,7 @@ impl From<&Job> for Setup {
             stock: job.stock.clone(),
             keep_outs: job.keep_outs.clone(),
             tolerance: job.tolerance,
+            limits: job.limits,
             safe_z_mm: job.safe_z_mm,
             clearance_mm: job.clearance_mm,
             strict: job.strict,

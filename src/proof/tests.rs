@@ -5,8 +5,8 @@ use crate::cutter::Profile;
 use crate::gcode::read;
 use crate::geom::{DVec2, DVec3, Grid, Move, MoveKind, Tolerance};
 use crate::job::{
-    ArtworkSpec, Background, CutterShape, Fit, Machine, Operation, OperationKind, Origin, Place,
-    ReliefSpec, Stepover, Stock, TraceSpec, Within, Wood,
+    ArtworkSpec, Background, CutterShape, Fit, Limits, Machine, Operation, OperationKind, Origin,
+    Place, ReliefSpec, Stepover, Stock, TraceSpec, Within, Wood,
 };
 use crate::stock::Block;
 use proptest::prelude::*;
@@ -83,6 +83,7 @@ pub(super) fn job(cutter: CutterSpec) -> Job {
         safe_z_mm: 5.0,
         clearance_mm: 0.5,
         ramp_rad: 0.1,
+        limits: Limits::default(),
         strict: false,
         artwork_unit_mm: 1.0,
         artwork_lower_left_mm: DVec2::ZERO,
@@ -474,6 +475,33 @@ fn wood_left_where_a_cutter_reaches_fails_a_strict_job_only() {
     let v = verdict(&job, &lines).unwrap();
     assert_eq!(v.failures.len(), 1);
     assert_eq!(v.failures[0].kind, FailureKind::Leftover);
+}
+
+/// Limits of the job fail the proof just above them, and say where.
+#[test]
+fn limits_of_the_job_are_judged() {
+    let with = |limits: Limits| Job { limits, ..flat_job() };
+    let limits = Limits::default();
+    // Slots 2 mm deep at 1500 mm/min, 18000 1/min and two flutes: straight ahead each tooth takes 1500 / 36000 mm.
+    let chip_mm = 1500.0 / 36_000.0;
+    let fits =
+        Limits { engaged_mm: Some(2.0), chip_load_mm: Some(chip_mm), leftover_mm: Some(0.5) };
+    let v = verdict(&with(fits), &CLEAN).unwrap();
+    assert!(v.passed(), "{:#?}", v.failures);
+    let high = with(Limits { engaged_mm: Some(1.99), ..limits });
+    let f = assert_caught(&high, &CLEAN, FailureKind::Engagement, 7);
+    assert_eq!((f.amount, f.limit, f.count), (2.0, 1.99, 4));
+    let thick = with(Limits { chip_load_mm: Some(0.999 * chip_mm), ..limits });
+    let f = assert_caught(&thick, &CLEAN, FailureKind::ChipLoad, 8);
+    assert!((f.amount - chip_mm).abs() < 1e-6 && f.count == 2, "{f:?}");
+    // The second slot is missing: 2 mm are left there.
+    let lines = broken(13, None);
+    let left = |mm| verdict(&with(Limits { leftover_mm: Some(mm), ..limits }), &lines).unwrap();
+    assert!(left(2.01).passed());
+    let v = left(1.99);
+    assert_eq!(v.failures.len(), 1);
+    assert_eq!((v.failures[0].kind, v.failures[0].limit), (FailureKind::Leftover, 1.99));
+    assert!((v.failures[0].amount - 2.0).abs() < 1e-6);
 }
 
 #[test]

@@ -3,8 +3,8 @@
 use super::*;
 use crate::geom::{DVec3, Ring, Tolerance};
 use crate::job::{
-    ArtworkSpec, Fit, GroupSpec, LayerSpec, Machine, Origin, Place as At, Profile, ReliefSpec,
-    Selector, Stock, SurfaceSpec, TraceSpec, Wood,
+    ArtworkSpec, Fit, GroupSpec, LayerSpec, Limits, Machine, Origin, Place as At, Profile,
+    ReliefSpec, Selector, Stock, SurfaceSpec, TraceSpec, Wood,
 };
 use crate::outline::{Figure, OutlineLayer, Region};
 use crate::relief::band::COVERAGE_ROUNDING;
@@ -63,6 +63,7 @@ fn job(layers: Vec<LayerSpec>) -> Job {
         safe_z_mm: 5.0,
         clearance_mm: 0.5,
         ramp_rad: 0.1,
+        limits: Limits::default(),
         strict: false,
         artwork_unit_mm: 1.0,
         artwork_lower_left_mm: DVec2::ZERO,

@@ -1,11 +1,23 @@
 //! What the HTML report and the text summary are made of: plain, owned values.
 
+/// What a report is about.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Occasion {
+    /// A carving: programs that relievo made and proved.
+    #[default]
+    Carving,
+    /// A dry run of programs, whoever made them.
+    DryRun,
+}
+
 /// Everything that the report says about one job.
 #[derive(Debug, Clone, Default)]
 pub struct ReportData {
+    /// What it is about.
+    pub occasion: Occasion,
     /// Name of the job.
     pub title: String,
-    /// File the artwork came from.
+    /// Files that the artwork came from; for a dry run how many programs: `2 programs`.
     pub artwork: String,
     /// Name of the machine, for people.
     pub machine: String,
@@ -17,12 +29,18 @@ pub struct ReportData {
     pub cutters: Vec<CutterRow>,
     /// The programs in the order of use.
     pub programs: Vec<ProgramRow>,
+    /// What the programs ask of wood, cutters and machine, in the same order.
+    pub loads: Vec<LoadRow>,
     /// True when every check passed and the programs may be run.
     pub passed: bool,
+    /// All that is wrong, in sentences.
+    pub findings: Vec<String>,
     /// What was checked, one line each.
     pub checks: Vec<Check>,
     /// What stays above the target.
     pub leftover: Vec<LeftoverRow>,
+    /// Smaller cutters, and which part of what those used do not reach each of them would, 0..1.
+    pub finer: Vec<(String, f64)>,
     /// What the user should know.
     pub notes: Vec<String>,
     /// The pictures, the most telling one first.
@@ -117,6 +135,31 @@ pub struct ProgramRow {
     pub deepest_mm: f64,
     /// Time by the model of the controller's planner, s.
     pub time_s: f64,
+}
+
+/// Where the time of a program goes, and its hardest moments.
+#[derive(Debug, Clone, Default)]
+pub struct LoadRow {
+    /// File name, or part of a file.
+    pub file: String,
+    /// Time of the feed moves in wood, s.
+    pub cutting_s: f64,
+    /// Time of those in air, s.
+    pub air_s: f64,
+    /// Time of the rapids, s.
+    pub rapid_s: f64,
+    /// Time of waiting, s.
+    pub waiting_s: f64,
+    /// Time of the feed moves that go down steeper than 45 degrees, s; part of the first two.
+    pub plunge_s: f64,
+    /// Thickest wood taken at a place, mm, with its line.
+    pub takes_mm: Option<(f64, u32)>,
+    /// Highest wood above the tip of a cutting move, mm.
+    pub engaged_mm: Option<(f64, u32)>,
+    /// Thickest chip of a tooth, mm.
+    pub chip_mm: Option<(f64, u32)>,
+    /// Fastest way down in wood, mm/min.
+    pub down_mm_per_min: Option<(f64, u32)>,
 }
 
 /// One check of the proof.
@@ -293,6 +336,7 @@ pub(super) mod tests {
                 caption: "What the dry run leaves.".to_owned(),
                 png: vec![0x89, b'P', b'N', b'G', 13, 10, 26, 10],
             }],
+            ..ReportData::default()
         }
     }
 

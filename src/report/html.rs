@@ -1,12 +1,12 @@
 //! The report as one HTML file that needs nothing else: pictures and style are inside it.
 
-use super::data::{Picture, ReportData, duration, grouped, percent, short};
+use super::data::{Occasion, Picture, ReportData, duration, grouped, percent, short};
 use maud::{DOCTYPE, Markup, PreEscaped, html as markup};
 
 pub(super) const STYLE: &str = include_str!("report.css");
 
-/// The whole job as one HTML page: verdict and pictures first, then stock, layers, cutters, programs,
-/// every check, leftover and notes. It refers to nothing outside itself, has no scripts, and is laid
+/// The whole job as one HTML page: verdict, faults and pictures first, then programs and what they ask of the machine, every
+/// check, leftover, stock, cutters, layers and notes. It refers to nothing outside itself, has no scripts, and is laid
 /// out for the screen and for A4 paper.
 pub fn html(data: &ReportData) -> String {
     let page = markup! {
@@ -21,8 +21,10 @@ pub fn html(data: &ReportData) -> String {
             body {
                 main {
                     (head(data))
+                    (findings(&data.findings))
                     (pictures(&data.pictures))
                     (programs(data))
+                    (loads(data))
                     (proof(data))
                     div.pair { (stock(data)) (cutters(data)) }
                     (layers(data))
@@ -38,20 +40,45 @@ pub fn html(data: &ReportData) -> String {
 fn head(data: &ReportData) -> Markup {
     let stock = &data.stock;
     let size = [stock.width_mm, stock.height_mm, stock.thickness_mm].map(short).join(" × ");
-    let (class, word) =
-        if data.passed { ("good", "Proof passed") } else { ("bad", "Proof failed") };
+    let (class, word) = match (data.occasion, data.passed) {
+        (Occasion::Carving, true) => ("good", "Proof passed"),
+        (Occasion::Carving, false) => ("bad", "Proof failed"),
+        (Occasion::DryRun, true) => ("good", "Dry run passed"),
+        (Occasion::DryRun, false) => ("bad", "Dry run failed"),
+    };
+    let advice = match data.occasion {
+        Occasion::Carving => "no program was written",
+        Occasion::DryRun => "do not run these programs",
+    };
     markup! {
         header {
             div {
                 h1 { (data.title) }
                 p.lead {
-                    (size) " mm " (stock.wood) ", carved " (short(stock.relief_depth_mm)) " mm deep from "
-                    (data.artwork) " on " (data.machine)
+                    (size) " mm " (stock.wood) ", "
+                    @match data.occasion {
+                        Occasion::Carving => {
+                            "carved " (short(stock.relief_depth_mm)) " mm deep from " (data.artwork)
+                        }
+                        Occasion::DryRun => { "dry run of " (data.artwork) }
+                    }
+                    " on " (data.machine)
                 }
             }
             div.verdict.(class) {
                 strong { (word) }
-                span { @if data.passed { (duration(data.total_time_s())) } @else { "no program was written" } }
+                span { @if data.passed { (duration(data.total_time_s())) } @else { (advice) } }
+            }
+        }
+    }
+}
+
+fn findings(findings: &[String]) -> Markup {
+    markup! {
+        @if !findings.is_empty() {
+            section {
+                h2 { "What is wrong" }
+                ul { @for finding in findings { li { span.bad { (finding) } } } }
             }
         }
     }
@@ -118,10 +145,54 @@ fn programs(data: &ReportData) -> Markup {
     }
 }
 
+/// Where the time goes and the hardest moments, each with its line.
+fn loads(data: &ReportData) -> Markup {
+    let peak = |peak: Option<(f64, u32)>, digits: usize| {
+        markup! {
+            td.n {
+                @match peak {
+                    Some((value, line)) => {
+                        (format!("{value:.digits$}")) " " span.line { "line " (grouped(line as usize)) }
+                    }
+                    None => { "-" }
+                }
+            }
+        }
+    };
+    markup! {
+        @if !data.loads.is_empty() {
+            section {
+                h2 { "Time and load" }
+                table {
+                    thead {
+                        tr {
+                            th { "File" } th.n { "Cutting" } th.n { "Air" } th.n { "Rapids" } th.n { "Waiting" }
+                            th.n { "Steeply down" } th.n { "Takes, mm" } th.n { "Engages, mm" }
+                            th.n { "Chips, mm" } th.n { "Down, mm/min" }
+                        }
+                    }
+                    tbody {
+                        @for l in &data.loads {
+                            tr {
+                                td { code { (l.file) } }
+                                @for s in [l.cutting_s, l.air_s, l.rapid_s, l.waiting_s, l.plunge_s] {
+                                    td.n { (duration(s)) }
+                                }
+                                (peak(l.takes_mm, 2)) (peak(l.engaged_mm, 2)) (peak(l.chip_mm, 3))
+                                (peak(l.down_mm_per_min, 0))
+                            }
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
 fn proof(data: &ReportData) -> Markup {
     markup! {
         section {
-            h2 { "Proof" }
+            h2 { @match data.occasion { Occasion::Carving => "Proof", Occasion::DryRun => "Checks" } }
             table {
                 thead { tr { th { "Check" } th { "Result" } th { "Found" } } }
                 tbody {
@@ -157,6 +228,16 @@ fn proof(data: &ReportData) -> Markup {
                     }
                 }
             }
+            @if !data.finer.is_empty() {
+                p {
+                    "Of what only a smaller cutter reaches, "
+                    @for (k, (name, part)) in data.finer.iter().enumerate() {
+                        @if k > 0 { ", " }
+                        (name) " would reach " (format!("{:.0} %", 100.0 * part))
+                    }
+                    "."
+                }
+            }
         }
     }
 }
@@ -177,7 +258,10 @@ fn stock(data: &ReportData) -> Markup {
         ("Grain", format!("{}° from the x axis", short(s.grain_deg))),
         ("Zero", s.zero.clone()),
         (
-            "Relief",
+            match data.occasion {
+                Occasion::Carving => "Relief",
+                Occasion::DryRun => "Carved",
+            },
             format!("{} mm deep, a node every {} mm", short(s.relief_depth_mm), short(s.pitch_mm)),
         ),
     ];
@@ -217,7 +301,7 @@ fn cutters(data: &ReportData) -> Markup {
 
 fn layers(data: &ReportData) -> Markup {
     markup! {
-        section {
+        @if !data.layers.is_empty() { section {
             h2 { "Layers, bottom to top" }
             table {
                 thead {
@@ -237,7 +321,7 @@ fn layers(data: &ReportData) -> Markup {
                     }
                 }
             }
-        }
+        } }
     }
 }
 
@@ -284,6 +368,7 @@ fn base64(bytes: &[u8], out: &mut String) {
 
 #[cfg(test)]
 mod tests {
+    use super::super::data::LoadRow;
     use super::super::data::tests::sample;
     use super::*;
 
@@ -332,6 +417,45 @@ mod tests {
         assert!(page.contains("a &lt; b"));
         assert!(!page.contains("background:#12345"));
         assert!(page.contains("background:#ff6cc7"));
+    }
+
+    #[test]
+    fn a_dry_run_says_what_is_wrong_and_where_the_load_is() {
+        let load = LoadRow {
+            file: "part.nc".to_owned(),
+            cutting_s: 75.0,
+            takes_mm: Some((1.25, 1234)),
+            chip_mm: Some((0.0416, 8)),
+            ..LoadRow::default()
+        };
+        let data = ReportData {
+            occasion: Occasion::DryRun,
+            artwork: "2 programs".to_owned(),
+            layers: Vec::new(),
+            loads: vec![load],
+            passed: false,
+            findings: vec!["part.nc line 8: a rapid".to_owned()],
+            finer: vec![("ball-1".to_owned(), 0.6), ("ball-2".to_owned(), 0.314)],
+            ..sample()
+        };
+        let page = html(&data);
+        for text in [
+            "dry run of 2 programs on Shapeoko 3",
+            "Dry run failed",
+            "do not run these programs",
+            "<li><span class=\"bad\">part.nc line 8: a rapid</span></li>",
+            "1 min 15 s",
+            "1.25 <span class=\"line\">line 1 234</span>",
+            "0.042 <span class=\"line\">line 8</span>",
+            "ball-1 would reach 60 %, ball-2 would reach 31 %.",
+        ] {
+            assert!(page.contains(text), "{text}");
+        }
+        for text in ["Layers", "no program was written", "Proof"] {
+            assert!(!page.contains(text), "{text}");
+        }
+        let good = html(&ReportData { passed: true, findings: Vec::new(), ..data });
+        assert!(good.contains("Dry run passed") && !good.contains("What is wrong"));
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use crate::geom::{DVec2, DVec3, Grid, Heightfield, Tolerance};
 use crate::job::{
-    ArtworkSpec, Background, Combine, CutterShape, CutterSpec, Fit, Follow, Job, LayerSpec,
+    ArtworkSpec, Background, Combine, CutterShape, CutterSpec, Fit, Follow, Job, LayerSpec, Limits,
     Machine, Milling, Operation, OperationKind, Origin, Pattern, Place, Profile, ReliefSpec,
     Selector, Stepover, Stock, SurfaceSpec, TraceSpec, Within, Wood,
 };
@@ -81,6 +81,7 @@ pub(crate) fn job(
         safe_z_mm: 5.0,
         clearance_mm: 1.0,
         ramp_rad: 5.0_f64.to_radians(),
+        limits: Limits::default(),
         strict: false,
         artwork_unit_mm: 1.0,
         artwork_lower_left_mm: DVec2::ZERO,

@@ -7,7 +7,7 @@ use crate::cutter::Profile;
 use crate::gcode::read::{self, Frame, Program, Start};
 use crate::geom::{Bounds, DVec2, DVec3, Grid, Heightfield, Tolerance};
 use crate::heights::{self, Given, HeightsError};
-use crate::job::{CutterSpec, Job, Library, Machine, Operation, Origin, Stock, Wood};
+use crate::job::{CutterSpec, Job, Library, Limits, Machine, Operation, Origin, Stock, Wood};
 use crate::proof::{Manners, Part, Setup};
 use crate::relief::Grounds;
 use crate::report::Cut;
@@ -197,6 +197,7 @@ fn without_job(
         tolerance: Tolerance::default(),
         safe_z_mm: 0.0,
         clearance_mm: CLEARANCE_MM,
+        limits: Limits::default(),
         strict: false,
         operations: Vec::new(),
         zero_mm: args.zero,

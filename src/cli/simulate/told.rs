@@ -26,7 +26,7 @@ pub(super) fn text(done: &Simulated, written: Option<&str>) -> String {
         let _ = writeln!(out, "all programs: {}", clock(verdict.seconds));
     }
     if let Some((low, high)) = verdict.envelope {
-        out += &zero(low, high, ready.setup.zero_mm.is_some());
+        let _ = writeln!(out, "{}", zero(low, high, ready.setup.zero_mm.is_some()));
     }
     if ready.target.is_some() {
         if let Some(g) = &verdict.gouge {
@@ -104,13 +104,13 @@ fn told(what: &str, peak: Peak, digits: usize, unit: &str) -> String {
 }
 
 /// Where the zero may lie, so that everything stays inside the machine's travel.
-fn zero(low: DVec3, high: DVec3, known: bool) -> String {
+pub(super) fn zero(low: DVec3, high: DVec3, known: bool) -> String {
     let room = |axis: usize| (0.0 - low[axis]).max(0.0);
     let above = |axis: usize| high[axis].max(0.0);
     let advice = if known { "" } else { " (--zero checks it)" };
     format!(
         "room that the zero needs: {:.1} mm to its left, {:.1} right, {:.1} in front, {:.1} behind, {:.1} below, \
-         {:.1} above{advice}\n",
+         {:.1} above{advice}",
         room(0),
         above(0),
         room(1),

@@ -242,6 +242,8 @@ fn what_does_not_fit_together_is_refused() {
         &["must not be more than gouge_mm"],
     );
     refused(&with("[safety]\nclearance_mm = 9\n"), kind, (4, 16), &["safe_z_mm 5"]);
+    let cusps = &["cusps that are planned, 0.01", "tolerance.scallop_mm to 0.005"];
+    refused(&with("[limits]\nleftover_mm = 0.005\n"), kind, (4, 15), cusps);
     refused(
         &with("[[layer]]\nselect = \"all\"\nheight_mm = 9\n"),
         kind,
