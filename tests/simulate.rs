@@ -410,6 +410,47 @@ fn programs_from_elsewhere_pass() {
     }
 }
 
+/// What comments tell of cutters and stock is taken where no flag says something else, and said.
+#[test]
+fn comments_of_programs_from_elsewhere_tell_cutters_and_stock() {
+    let desk = tempfile::tempdir().unwrap();
+    let simulate = |name: &str, more: &[&str]| {
+        let file = example(name);
+        let mut args =
+            vec!["simulate", file.to_str().unwrap(), "--dry", "--json", "--machine", "1325"];
+        args.extend(more);
+        let out = relievo(desk.path(), &args);
+        let err = String::from_utf8_lossy(&out.stderr).into_owned();
+        assert_eq!(out.status.code(), Some(0), "{name}: {err}");
+        serde_json::from_slice::<serde_json::Value>(&out.stdout).unwrap()
+    };
+    let cutters = |json: &serde_json::Value| -> Vec<String> {
+        let programs = json["programs"].as_array().unwrap().iter();
+        programs.map(|p| p["cutter"].as_str().unwrap().to_owned()).collect()
+    };
+    // A ball of 6.35 mm, and a V of 60 degrees whose cone is 10 mm high on a tip of 0.03 mm.
+    let json = simulate("carbide_create.nc", &[]);
+    let widest = 0.03 + 20.0 / 3.0_f64.sqrt();
+    assert_eq!(cutters(&json), ["ball-6.35".to_owned(), format!("v-{widest:.3}")]);
+    assert_eq!(json["stock"]["size_mm"], serde_json::json!([90.0, 90.0, 12.0]));
+    let notes = json["notes"].to_string();
+    assert!(
+        notes.contains("TOOL/MILL,6.35") && notes.contains("comment of carbide_create.nc"),
+        "{notes}"
+    );
+    assert_eq!(cutters(&simulate("fusion_grbl.nc", &[])), ["flat-6"]);
+    // Flags go first, a form in short too.
+    let short = simulate("fusion_grbl.nc", &["--cutter", "bull:6:1", "--stock", "60x60x9"]);
+    assert_eq!(
+        (cutters(&short), &short["stock"]["size_mm"][2]),
+        (vec!["bull-6".to_owned()], &serde_json::json!(9.0))
+    );
+    let file = example("fusion_grbl.nc");
+    let out = relievo(desk.path(), &["simulate", file.to_str().unwrap(), "--cutter", "bull:6:4"]);
+    let err = String::from_utf8_lossy(&out.stderr);
+    assert!(out.status.code() == Some(1) && err.contains("does not fit on a cutter of 6"), "{err}");
+}
+
 /// A program that has lost its G20, held against what it should have made: the target is what a cutter of 8 mm leaves, so
 /// that its walls stand clear of the one of 6 mm by more than a node.
 #[test]

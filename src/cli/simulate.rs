@@ -1,6 +1,8 @@
 //! `relievo simulate FILE.nc...`: a dry run of any programs on a virtual blank, and what it shows.
 
+mod cutters;
 mod header;
+mod hints;
 mod place;
 mod shown;
 mod told;
@@ -47,11 +49,12 @@ pub(super) struct Args {
     #[arg(long, value_name = "MACHINE")]
     machine: Option<String>,
 
-    /// The cutter, a name from `relievo cutters`: one for all programs, or one for each, in their order
+    /// The cutter, a name from `relievo cutters` or a form (flat:6, ball:3.175, bull:6:1, v:12:60:0.2, tapered:6:1:5.4; mm and
+    /// degrees): one for all programs, or one for each, in their order (default: what comments of the programs say)
     #[arg(long = "cutter", value_name = "NAME")]
     cutters: Vec<String>,
 
-    /// The cutter of a tool number (T word)
+    /// The cutter of a tool number (T word), a name or a form
     #[arg(long = "tool", value_name = "N=NAME", value_parser = tool)]
     tools: Vec<(u32, String)>,
 

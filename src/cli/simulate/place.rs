@@ -1,7 +1,9 @@
 //! What the programs run on: taken from the flags, else from the job, else from the programs themselves.
 
 use super::Args;
+use super::cutters::Cutters;
 use super::header::Header;
+use super::hints::Hints;
 use crate::cli::{Stop, files, inputs, outcome};
 use crate::cutter::Profile;
 use crate::gcode::read::{self, Frame, Program, Start};
@@ -33,11 +35,12 @@ pub(super) struct Ready {
     pub(super) notes: Vec<String>,
 }
 
-/// A program's text with its name and what its header says.
-struct Source {
-    name: String,
+/// A program's text with its name, and what its comments say.
+pub(super) struct Source {
+    pub(super) name: String,
     bytes: Vec<u8>,
-    header: Header,
+    pub(super) header: Header,
+    pub(super) hints: Hints,
 }
 
 /// Without a job: height of the tip before the first move above the stock's top, mm.
@@ -117,7 +120,8 @@ fn source(path: &Path) -> Result<Source> {
     let bytes = files::read(path)?;
     let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let header = Header::of(&String::from_utf8_lossy(&bytes));
-    Ok(Source { name, bytes, header })
+    let hints = if header.is_ours { Hints::default() } else { Hints::of(&bytes) };
+    Ok(Source { name, bytes, header, hints })
 }
 
 /// Our rules hold where relievo wrote all programs.
@@ -164,7 +168,17 @@ fn without_job(
     let cutters = Cutters { args, library, job: &[] };
     let frame = frame(args, DVec3::new(0.0, 0.0, START_MM), CLEAR_MM);
     let parts = parts(sources, &machine, frame, &cutters, &mut notes)?;
-    let (size, origin) = match (args.stock.or(header.stock_mm), args.origin.or(header.origin)) {
+    let hinted = sources[0].hints.stock.filter(|_| args.stock.is_none() && args.origin.is_none());
+    if let Some((size, at)) = hinted {
+        notes.push(format!(
+            "the stock is what a comment of {} says: {} x {} x {} mm, zero X{} Y{} from its lower left corner, at its top \
+             (--stock, --origin)",
+            sources[0].name, size.x, size.y, size.z, at.x, at.y
+        ));
+    }
+    let stock_mm = args.stock.or(header.stock_mm).or(hinted.map(|hint| hint.0));
+    let origin = args.origin.or(header.origin).or(hinted.map(|hint| Origin::Point(hint.1)));
+    let (size, origin) = match (stock_mm, origin) {
         (Some(size), origin) => (size, origin.unwrap_or(Origin::LowerLeft)),
         (None, Some(_)) => bail!("--origin needs the size of the stock; give --stock as 120x80x18"),
         (None, None) => {
@@ -251,62 +265,6 @@ fn wood(library: &Library, name: &str) -> Result<Wood> {
     })
 }
 
-/// Which cutter a program, or a tool of it, means.
-struct Cutters<'a> {
-    args: &'a Args,
-    library: &'a Library,
-    /// Those of the job.
-    job: &'a [&'a CutterSpec],
-}
-
-impl Cutters<'_> {
-    /// The cutter for the tool number of the `k`th program.
-    fn find(&self, k: usize, source: &Source, tool: Option<u32>) -> Result<CutterSpec> {
-        if let Some(name) =
-            tool.and_then(|t| self.args.tools.iter().find(|(n, _)| *n == t)).map(|(_, name)| name)
-        {
-            return self.named(name);
-        }
-        match (&self.args.cutters[..], &source.header.cutter) {
-            ([name], _) | ([], Some(name)) => self.named(name),
-            ([], None) => {
-                if let [only, others @ ..] = self.job
-                    && others.iter().all(|o| o == only)
-                {
-                    return Ok((*only).clone());
-                }
-                let how = match tool {
-                    Some(t) => format!("--tool {t}=NAME"),
-                    None => "--cutter NAME".to_owned(),
-                };
-                bail!(
-                    "{}: which cutter is it for? Give {how} (`relievo cutters` lists them)",
-                    source.name
-                )
-            }
-            (names, _) => match names.get(k) {
-                Some(name) => self.named(name),
-                None => bail!(
-                    "{} cutters for {} programs; give one --cutter for all, or one for each",
-                    names.len(),
-                    self.args.programs.len()
-                ),
-            },
-        }
-    }
-
-    fn named(&self, name: &str) -> Result<CutterSpec> {
-        let of_job = self.job.iter().find(|c| c.name == name).copied();
-        of_job.or_else(|| self.library.cutter(name)).cloned().ok_or_else(|| {
-            let names: Vec<_> = self.library.cutters().map(|c| c.name.as_str()).collect();
-            anyhow!(
-                "there is no cutter '{name}'; choose one of {}, or describe it in machines/cutters.toml beside the program",
-                names.join(", ")
-            )
-        })
-    }
-}
-
 /// What the coordinates of the programs mean.
 fn frame(args: &Args, start: DVec3, clear_z_mm: f64) -> Frame {
     let mut frame = Frame { clear_z_mm, ..Frame::new(start) };
@@ -342,7 +300,9 @@ fn parts(
             frame.start = Start::Known(end);
         }
         notes.extend(program.notes.iter().map(|note| format!("{}: {note}", source.name)));
-        parts.extend(Part::split(&source.name, program, |tool| cutters.find(k, source, tool))?);
+        parts.extend(Part::split(&source.name, program, |tool| {
+            cutters.find(k, source, tool, notes)
+        })?);
     }
     Ok(parts)
 }

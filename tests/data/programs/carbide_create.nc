@@ -1,6 +1,7 @@
 (Design File: coaster)
 (stockMin:0.00mm, 0.00mm, -12.00mm)
 (stockMax:90.00mm, 90.00mm, 0.00mm)
+(STOCK/BLOCK,90.00, 90.00, 12.00,0.00, 0.00, 12.00)
 G90
 G21
 (Move to safe Z to avoid workholding)
@@ -19,7 +20,7 @@ G0Z12.700
 M05
 (Move to safe Z to avoid workholding)
 G53G0Z-5.000
-(TOOL/MILL,1.0, 30.0, 0.0, 0.0)
+(TOOL/MILL,0.03, 0.00, 10.00, 30.00)
 M6T301
 M03S20000
 G0X45.000Y45.000
