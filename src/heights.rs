@@ -9,6 +9,7 @@
 //! Lengths are millimetres in work coordinates: Z = 0 is the stock's top, X and Y lie as in the programs.
 //! The scale of a picture comes from its text chunks (see [`crate::heights::PngScale`]) or from the caller.
 
+mod floor;
 mod picture;
 mod stl;
 
@@ -172,6 +173,9 @@ pub enum HeightsError {
 pub struct Read {
     /// The heights.
     pub field: Heightfield,
+    /// For a mesh: the lowest heights that it may have between the nodes, at walls and valleys that the grid cannot tell
+    /// better. What is cut below these is cut below the mesh.
+    pub floor: Option<Heightfield>,
     /// What the user should know.
     pub notes: Vec<String>,
 }
@@ -188,6 +192,7 @@ pub fn read(
     beyond_mm: f32,
 ) -> Result<Read, HeightsError> {
     let mut notes = Vec::new();
+    let mut floor = None;
     let (field, covered) = if bytes.starts_with(&picture::SIGNATURE) {
         onto(&png(bytes, given)?, grid, beyond_mm)?
     } else {
@@ -206,6 +211,8 @@ pub fn read(
                  bottom, Z{bottom_mm:.3}"
             ));
         }
+        floor =
+            Some(floor::floor(&facets, &seen.field, beyond_mm)).filter(|low| *low != seen.field);
         (seen.field, seen.covered + seen.through)
     };
     if covered < grid.len() {
@@ -214,7 +221,7 @@ pub fn read(
             "the heights given leave {part:.1} % of the stock open; it is taken to stay at z {beyond_mm} mm there"
         ));
     }
-    Ok(Read { field, notes })
+    Ok(Read { field, floor, notes })
 }
 
 /// Heights of one field at the nodes of another grid, on the triangles between its nodes; `beyond_mm` outside. Also the

@@ -118,11 +118,12 @@ pub struct Verdict {
     pub remarks: Vec<Failure>,
     /// What is left above the target; all 0 without one.
     pub leftover: Leftover,
-    /// The deepest penetration into the target found, also when it is within the tolerance.
+    /// The deepest penetration into the target found at nodes and halfway between them, also when it is within the tolerance;
+    /// that of moves into walls where it is beyond it.
     pub gouge: Option<Gouge>,
     /// What each part does, in order.
     pub programs: Vec<ProgramReport>,
-    /// Lowest and highest place of the tip along each axis, work coordinates, mm; `None` without a move.
+    /// Lowest and highest place of the tip along each axis that the programs tell, work coordinates, mm; `None` without a move.
     pub envelope: Option<(DVec3, DVec3)>,
     /// Time of all programs, without changing cutters, s.
     pub seconds: f64,
@@ -140,6 +141,9 @@ pub struct Verdict {
 pub struct Wanted<'a> {
     /// The target.
     pub target: &'a Heightfield,
+    /// What is cut below this is a gouge: the target itself, or a little lower where its heights are known at the nodes only
+    /// ([`crate::heights::Read::floor`]).
+    pub floor: &'a Heightfield,
     /// The lowest surface that the finishing cutters can leave (the morphological closing of the target), on the target's
     /// grid; it parts the leftover into what they could have removed and what only a smaller one could.
     pub reach: &'a Heightfield,
@@ -169,7 +173,7 @@ pub fn prove(
         Err(source) => Err(ProofError::Read { program: p.name.to_owned(), source }),
     };
     let parts = programs.iter().map(read_one).collect::<Result<Vec<_>, _>>()?;
-    let wanted = Some(Wanted { target, reach });
+    let wanted = Some(Wanted { target, floor: target, reach });
     judge(&parts, &Setup::from(job), *target.grid(), wanted)
 }
 
@@ -187,7 +191,7 @@ pub fn judge(
     let usable = |h: &Heightfield| {
         *h.grid() == grid && h.range().is_some_and(|r| r.0.is_finite() && r.1.is_finite())
     };
-    if wanted.is_some_and(|w| !usable(w.target) || !usable(w.reach)) {
+    if wanted.is_some_and(|w| ![w.target, w.floor, w.reach].into_iter().all(usable)) {
         return Err(ProofError::BadTarget);
     }
     let mut ledger = Ledger::default();
@@ -196,12 +200,12 @@ pub fn judge(
         parts.iter().map(|p| Track { cutter: &p.cutter, moves: &p.program.moves }).collect();
     let mut gouge = None;
     let held = match wanted {
-        Some(Wanted { target, reach }) => {
-            let mut held = deviation::hold(&replay.carved, target, reach, setup);
-            let halves = halves::hold(&tracks, setup, target, reach);
+        Some(wanted @ Wanted { floor, .. }) => {
+            let mut held = deviation::hold(&replay.carved, wanted, setup);
+            let halves = halves::hold(&tracks, setup, wanted);
             held.leftover.between_mm = halves.left_mm;
             gouge =
-                deviation::judge_gouge(&held, &halves, &tracks, parts, setup, target, &mut ledger);
+                deviation::judge_gouge(&held, &halves, &tracks, parts, setup, floor, &mut ledger);
             deviation::judge_leftover(&held, setup, &mut ledger);
             held
         }
@@ -223,10 +227,19 @@ pub fn judge(
     })
 }
 
-/// The box around all places of the tip, those before the first move left out.
+/// The box around all places of the tip that programs tell, those before the first move left out; 0 along an axis that none
+/// tells.
 fn envelope(parts: &[Part]) -> Option<(DVec3, DVec3)> {
-    let places = parts.iter().flat_map(|p| p.program.moves.iter().map(|m| m.to));
-    places.map(|p| (p, p)).reduce(|(low, high), (p, _)| (low.min(p), high.max(p)))
+    if parts.iter().all(|part| part.program.moves.is_empty()) {
+        return None;
+    }
+    let (mut low, mut high) = (DVec3::ZERO, DVec3::ZERO);
+    for axis in 0..3 {
+        let places = parts.iter().flat_map(|p| p.program.told_moves(axis).map(|m| m.to[axis]));
+        let ends = places.map(|v| (v, v)).reduce(|(a, b), (v, _)| (a.min(v), b.max(v)));
+        (low[axis], high[axis]) = ends.unwrap_or((0.0, 0.0));
+    }
+    Some((low, high))
 }
 
 #[cfg(test)]

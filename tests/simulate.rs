@@ -501,6 +501,152 @@ fn a_mesh_serves_as_the_target() {
     assert!(out.status.code() == Some(4) && err.contains("0.050 mm into the target"), "{err}");
 }
 
+/// Facets of a pocket 2 mm deep from `x0` to `x1` and `y0` to `y1` in the top of a stock of 100 x 80 mm.
+fn pocket_stl([x0, y0, x1, y1]: [f64; 4]) -> String {
+    let flat =
+        |a: f64, b: f64, c: f64, d: f64, z: f64| [[a, b, z], [c, b, z], [c, d, z], [a, d, z]];
+    let wall =
+        |a: f64, b: f64, c: f64, d: f64| [[a, b, -2.0], [c, d, -2.0], [c, d, 0.0], [a, b, 0.0]];
+    let quads = [
+        flat(x0, y0, x1, y1, -2.0),
+        flat(0.0, 0.0, 100.0, y0, 0.0),
+        flat(0.0, y1, 100.0, 80.0, 0.0),
+        flat(0.0, y0, x0, y1, 0.0),
+        flat(x1, y0, 100.0, y1, 0.0),
+        wall(x1, y0, x0, y0),
+        wall(x0, y1, x1, y1),
+        wall(x0, y0, x0, y1),
+        wall(x1, y1, x1, y0),
+    ];
+    let mut text = "solid pocket\n".to_owned();
+    for [a, b, c, d] in quads {
+        for corners in [[a, b, c], [a, c, d]] {
+            text += "facet normal 0 0 0\nouter loop\n";
+            for [x, y, z] in corners {
+                text += &format!("vertex {x} {y} {z}\n");
+            }
+            text += "endloop\nendfacet\n";
+        }
+    }
+    text + "endsolid pocket\n"
+}
+
+/// A pocket milled to the upright walls of a mesh is right wherever these stand between the nodes, one that is too wide by more
+/// than a node is not.
+#[test]
+fn upright_walls_of_a_mesh_may_be_followed_exactly() {
+    let desk = tempfile::tempdir().unwrap();
+    let mut text =
+        "G21 G90\nG0 Z5\nM3 S18000\nG4 P3\nG0 X20 Y20\nG1 Z0 F300\nZ-1\nX60 F1000\nX20\nZ-2 F300\n"
+            .to_owned();
+    for k in 0..=8 {
+        let y = 20.0 + 2.5 * f64::from(k);
+        text += &format!("Y{y} F1000\nX{}\n", if k % 2 == 0 { 60 } else { 20 });
+    }
+    text += "X20\nY20\nX60\nY40\nX20\nG0 Z5\nM5\nM30\n";
+    std::fs::write(desk.path().join("pocket.nc"), text).unwrap();
+    for (off, code) in [(0.0, 0), (0.01, 0), (0.03, 0), (-0.15, 4)] {
+        let stl = pocket_stl([17.0 - off, 17.0 - off, 63.0 + off, 43.0 + off]);
+        std::fs::write(desk.path().join("pocket.stl"), stl).unwrap();
+        let args = [
+            "simulate",
+            "pocket.nc",
+            "--stock",
+            "100x80x12",
+            "--cutter",
+            "flat-6",
+            "--pitch",
+            "0.1",
+        ];
+        let out = relievo(desk.path(), &[&args[..], &["--target", "pocket.stl", "--dry"]].concat());
+        let (said, err) =
+            (String::from_utf8_lossy(&out.stdout), String::from_utf8_lossy(&out.stderr));
+        assert_eq!(out.status.code(), Some(code), "{off}: {err}");
+        assert!(said.contains("are no gouges"), "{said}");
+    }
+}
+
+/// A machine's travel is held against the places that a program tells, not against the one where the tip is taken to stand.
+#[test]
+fn travel_counts_from_the_first_place_that_is_told() {
+    let desk = tempfile::tempdir().unwrap();
+    let simulate = |name: &str, text: &str, more: &[&str]| {
+        std::fs::write(desk.path().join(name), text).unwrap();
+        let args = ["simulate", name, "--cutter", "flat-6", "--dry", "--json"];
+        let out = relievo(desk.path(), &[&args[..], more].concat());
+        let json: serde_json::Value = serde_json::from_slice(&out.stdout).unwrap();
+        (out.status.code().unwrap(), json)
+    };
+    // The 3018 has 45 mm in Z.
+    let home = "G21 G90\nG28 G91 Z0\nG90\nM3 S10000\nG4 P3\nG0 X20 Y20\nZ15\nG1 Z-1.5 F100\nX40 F300\nG0 Z15\nG28 G91 Z0\nM5\nM30\n";
+    let (code, json) = simulate("home.nc", home, &["--machine", "3018", "--stock", "100x80x12"]);
+    assert_eq!(code, 0, "{json}");
+    assert_eq!(json["envelope_mm"], serde_json::json!([[20.0, 20.0, -1.5], [40.0, 20.0, 15.0]]));
+    let sideways =
+        "G21 G90\nM3 S18000\nG4 P3\nG0 X20 Y20\nZ5\nG1 Z-1 F200\nX40 F900\nG0 Z5\nM5\nM30\n";
+    let zero = ["--zero", "-300,-300,-20", "--stock", "100x80x12"];
+    let (code, json) = simulate("sideways.nc", sideways, &zero);
+    assert_eq!(code, 0, "{json}");
+    // What is told counts: 90 mm up.
+    let high = sideways.replace("G0 Z5\nM5", "G0 Z90\nM5");
+    let (code, json) = simulate("high.nc", &high, &zero);
+    assert_eq!(
+        (code, failures(&json, "soft-limit").len(), failures(&json, "travel").len()),
+        (4, 1, 1),
+        "{json}"
+    );
+}
+
+/// Slips with several cutters, files and no speed.
+#[test]
+fn slips_of_spindle_cutter_and_files_are_caught() {
+    let desk = tempfile::tempdir().unwrap();
+    let simulate = |files: &[(&str, &str)], more: &[&str]| {
+        let mut args = vec!["simulate", "--stock", "100x80x12", "--dry", "--json"];
+        for (name, text) in files {
+            std::fs::write(desk.path().join(name), text).unwrap();
+            args.push(name);
+        }
+        args.extend(more);
+        let out = relievo(desk.path(), &args);
+        let json = serde_json::from_slice(&out.stdout).unwrap_or_default();
+        (out.status.code().unwrap(), json, String::from_utf8_lossy(&out.stderr).into_owned())
+    };
+    let flat = ["--cutter", "flat-6"];
+    let slot = "G21 G90\nG0 Z5\nM3\nG4 P3\nG0 X20 Y20\nG1 Z-2 F200\nX40 F900\nG0 Z5\nM5\nM30\n";
+    let (code, json, err) = simulate(&[("speed.nc", slot)], &flat);
+    assert_eq!(
+        (code, failures(&json, "spindle-off")),
+        (4, vec![("speed.nc".to_owned(), 6)]),
+        "{err}"
+    );
+    // The cutter is changed while the tip is in the wood.
+    let change = "G21 G90\nT1 M6\nG0 Z5\nM3 S18000\nG4 P3\nG0 X20 Y20\nG1 Z-2 F200\nX40 F900\nT2 M6\nM3 S18000\nG4 P3\nG0 Z5\nG0 X30\n\
+                  G1 Z-1 F200\nG0 Z5\nM5\nM30\n";
+    let (code, json, err) =
+        simulate(&[("change.nc", change)], &["--tool", "1=flat-6", "--tool", "2=flat-3"]);
+    let found = failures(&json, "end-in-wood");
+    assert!(code == 4 && found.iter().any(|f| f.1 == 9), "{found:?} {err}");
+    // A zero that outlives its program.
+    let good = slot.replace("M3\n", "M3 S18000\n");
+    let shifted = good.replace("G0 Z5\nM5", "G0 Z5\nG92 X0 Y0\nM5");
+    let (code, _, err) = simulate(&[("a.nc", &shifted), ("b.nc", &good)], &flat);
+    assert!(code == 1 && err.contains("a.nc line 9 sets a zero"), "{err}");
+    assert_eq!(simulate(&[("b.nc", &good), ("a.nc", &shifted)], &flat).0, 0);
+    let cleared = shifted.replace("\nM5", "\nG92.1\nM5");
+    assert_eq!(simulate(&[("a.nc", &cleared), ("b.nc", &good)], &flat).0, 0);
+    // Nothing is cut: said.
+    let high = good.replace("Z-2", "Z2");
+    let (code, json, err) = simulate(&[("high.nc", &high)], &flat);
+    assert!(code == 0 && json["notes"].to_string().contains("nothing is cut"), "{err}");
+    // The metric word of older controllers.
+    let (code, json, err) = simulate(&[("g71.nc", &good.replace("G21", "G71"))], &flat);
+    assert_eq!((code, &json["programs"][0]["lowest_mm"]), (0, &serde_json::json!(-2.0)), "{err}");
+    let (_, json, _) =
+        simulate(&[("g70.nc", &good.replace("G21", "G70").replace("Z-2", "Z-.1"))], &flat);
+    assert_eq!(json["programs"][0]["lowest_mm"], serde_json::json!(-2.54));
+}
+
 /// The number behind a letter, outside comments.
 fn word(line: &str, letter: char) -> Option<f64> {
     if line.starts_with('(') {

@@ -171,8 +171,15 @@ pub(super) fn run(args: &Args) -> Result<(), Stop> {
     let mut outputs = if args.dry { None } else { Some(Outputs::prepare(&folder)?) };
     stages.enter("dry run");
     let wanted = ready.target.as_ref().zip(ready.reach.as_ref());
-    let wanted = wanted.map(|(target, reach)| Wanted { target, reach });
+    let wanted = wanted.map(|(target, reach)| Wanted {
+        target,
+        floor: ready.floor.as_ref().unwrap_or(target),
+        reach,
+    });
     let verdict = proof::judge(&ready.parts, &ready.setup, ready.grid, wanted)?;
+    if verdict.programs.iter().all(|p| p.extremes.thickest_mm.is_none()) {
+        ready.notes.push(NOTHING_CUT.to_owned());
+    }
     stages.enter("reach");
     let would_reach = would_reach(&ready);
     let done = Simulated { ready, verdict, would_reach };
@@ -198,6 +205,10 @@ pub(super) fn run(args: &Args) -> Result<(), Stop> {
     }
     if passed { Ok(()) } else { Err(Stop::CheckFailed(told::failures(&done.verdict))) }
 }
+
+/// What is said when no move meets wood.
+const NOTHING_CUT: &str = "nothing is cut: no move meets wood; Z0 is the stock's top here (where the programs' lies at its underside: \
+    --offset G54=0,0,-THICKNESS)";
 
 /// Which smaller cutters of the library would come where those of the programs do not, the best ones first.
 fn would_reach(ready: &Ready) -> Vec<(String, f64)> {

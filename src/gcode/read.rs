@@ -20,6 +20,7 @@ pub use fault::{Fault, ReadError};
 use crate::geom::{DVec3, Move};
 use crate::job::Machine;
 use reader::{Dialect, Reader};
+use std::ops::Range;
 
 /// A program as read.
 #[derive(Debug, Clone)]
@@ -38,11 +39,29 @@ pub struct Program {
     /// Where the tip ends, if the program has told it in all three axes; [`read_any`] alone sets it. The next program of
     /// the job starts there.
     pub end: Option<DVec3>,
+    /// For each axis the moves whose end in it no line has told: before the first word for it, and after a way to a place in
+    /// machine coordinates that is not known. [`read_any`] alone sets them.
+    pub guessed: [Vec<Range<usize>>; 3],
+    /// Line that sets a zero (G10, G92) which is in force at the end and is not the one of the start; a controller may keep
+    /// it for the next program. [`read_any`] alone sets it.
+    pub zero_line: Option<u32>,
     /// The work offset (54 for G54 to 59) whose zero was taken as the job's zero because nothing told where it lies.
     /// [`read_any`] alone sets it: programs of one job that differ here do not have one zero.
     pub assumed_zero: Option<u8>,
     /// What the user must know of how the program was taken; [`read_any`] alone writes them.
     pub notes: Vec<String>,
+}
+
+impl Program {
+    /// The moves whose end along an axis (0 for X) is told.
+    pub fn told_moves(&self, axis: usize) -> impl Iterator<Item = &Move> {
+        let guessed = &self.guessed[axis];
+        self.moves
+            .iter()
+            .enumerate()
+            .filter(move |(k, _)| !guessed.iter().any(|range| range.contains(k)))
+            .map(|(_, m)| m)
+    }
 }
 
 /// Something that is not a move.

@@ -85,6 +85,11 @@ impl Facets {
         Ok(Self { corners, min, max })
     }
 
+    /// Its facets, by their corners, mm.
+    pub(super) fn corners(&self) -> &[[[f32; 3]; 3]] {
+        &self.corners
+    }
+
     /// Number of facets.
     pub fn len(&self) -> usize {
         self.corners.len()

@@ -1,12 +1,11 @@
 //! Holds the carved surface against the target: gouge, leftover, and the second oracle's opinion.
 
-use super::Part;
-use super::Setup;
 use super::distance::Terrain;
 use super::failure::{FailureKind, Finding, Ledger};
 use super::halves::Halves;
 use super::oracle::{self, SplitMix64, Track};
 use super::walls::Walls;
+use super::{Part, Setup, Wanted};
 use crate::geom::{DVec2, DVec3, Heightfield};
 use rayon::prelude::*;
 
@@ -152,12 +151,12 @@ struct RowFound {
 /// Compares the carved surface with the target at every node.
 pub(super) fn hold(
     carved: &Heightfield,
-    target: &Heightfield,
-    reach: &Heightfield,
+    Wanted { target, floor, reach }: Wanted,
     setup: &Setup,
 ) -> Held {
     let grid = *target.grid();
     let (terrain, reached) = (Terrain::new(target), Terrain::new(reach));
+    let lowest = Terrain::new(floor);
     let tolerance = setup.tolerance;
     let limit = setup.leftover_limit_mm();
     let stock = setup.stock.bounds().grown(1e-9);
@@ -173,8 +172,13 @@ pub(super) fn hold(
                 let p = grid.node(i, j);
                 let (c, t) = (f64::from(carved.at(i, j)), f64::from(target.at(i, j)));
                 let at = p.extend(c);
-                let away = if c == t { 0.0 } else { terrain.distance(at) };
-                if c < t {
+                let is_deep = c < f64::from(floor.at(i, j));
+                let away = match (is_deep, c > t) {
+                    (true, _) => lowest.distance(at),
+                    (false, true) => terrain.distance(at),
+                    (false, false) => 0.0,
+                };
+                if is_deep {
                     *out = -away as f32;
                     row.gouge = Spot::worse(row.gouge, Some(Spot { amount: away, at }));
                     if away > tolerance.gouge_mm {
@@ -265,14 +269,14 @@ pub(super) fn judge_gouge(
     tracks: &[Track],
     parts: &[Part],
     setup: &Setup,
-    target: &Heightfield,
+    floor: &Heightfield,
     ledger: &mut Ledger,
 ) -> Option<Gouge> {
     let deepest = held.rows.iter().fold(None, |a, r| Spot::worse(a, r.gouge));
     let deepest = Spot::worse(deepest, halves.gouge);
     let too_deep = held.rows.iter().map(|r| r.too_deep).fold(Tally::default(), Tally::join);
     let too_deep = too_deep.join(halves.too_deep);
-    let overcut = judge_walls(tracks, parts, setup, target, ledger);
+    let overcut = judge_walls(tracks, parts, setup, floor, ledger);
     let Some(spot) = deepest else { return overcut };
     let by = oracle::lowest(tracks, &[spot.at.truncate()])[0].by;
     let (program, line) =
@@ -292,10 +296,10 @@ fn judge_walls(
     tracks: &[Track],
     parts: &[Part],
     setup: &Setup,
-    target: &Heightfield,
+    floor: &Heightfield,
     ledger: &mut Ledger,
 ) -> Option<Gouge> {
-    let walls = Walls::new(target);
+    let walls = Walls::new(floor);
     let limit = setup.tolerance.gouge_mm;
     let mut deepest: Option<Gouge> = None;
     for (track, part) in tracks.iter().zip(parts) {

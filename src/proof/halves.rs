@@ -13,10 +13,10 @@
 //! How near a cutter comes between two nodes is not known: it is taken to come as near as to both of them. Where the grid's
 //! own steps are finer than the cutter (along rims) that is too near, so what is left there is a bound, not a fault.
 
-use super::Setup;
 use super::deviation::{Spot, Tally, comes_near};
 use super::distance::Terrain;
 use super::oracle::Track;
+use super::{Setup, Wanted};
 use crate::cutter::Profile;
 use crate::geom::{DVec2, Grid, Heightfield, Tolerance};
 use crate::stock::Block;
@@ -49,8 +49,10 @@ struct Row {
 /// Target and reach, ready for distances.
 struct Against<'a> {
     target: &'a Heightfield,
+    floor: &'a Heightfield,
     reach: &'a Heightfield,
     terrain: Terrain<'a>,
+    lowest: Terrain<'a>,
     setup: &'a Setup,
 }
 
@@ -58,10 +60,10 @@ struct Against<'a> {
 pub(super) fn hold(
     tracks: &[Track],
     setup: &Setup,
-    target: &Heightfield,
-    reach: &Heightfield,
+    Wanted { target, floor, reach }: Wanted,
 ) -> Halves {
-    let against = Against { target, reach, terrain: Terrain::new(target), setup };
+    let (terrain, lowest) = (Terrain::new(target), Terrain::new(floor));
+    let against = Against { target, floor, reach, terrain, lowest, setup };
     let mut found = Halves::default();
     for row in SHIFTS.iter().flat_map(|&shift| against.rows(tracks, shift)) {
         found.gouge = Spot::worse(found.gouge, row.gouge);
@@ -95,8 +97,8 @@ impl Against<'_> {
                 let (c, t) = (f64::from(c), halfway(self.target, i));
                 let at = shifted.node(i, j).extend(c);
                 let known = row.gouge.map_or(0.0, |s| s.amount).min(gouge_mm);
-                if t - c > known {
-                    let amount = self.terrain.distance(at);
+                if halfway(self.floor, i) - c > known {
+                    let amount = self.lowest.distance(at);
                     row.gouge = Spot::worse(row.gouge, Some(Spot { amount, at }));
                     if amount > gouge_mm {
                         row.too_deep.add(amount, at);

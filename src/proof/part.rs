@@ -69,6 +69,12 @@ impl Part {
                     blind_line: program.blind_line.filter(|_| opens),
                     first_z: program.first_z.filter(|_| opens),
                     notes: Vec::new(),
+                    guessed: program.guessed.each_ref().map(|ranges| {
+                        let own = ranges.iter().map(|r| r.start.max(first)..r.end.min(end));
+                        own.filter(|r| r.start < r.end)
+                            .map(|r| r.start - first..r.end - first)
+                            .collect()
+                    }),
                     ..program
                 },
                 lines_before: if opens { 0 } else { line - 1 },

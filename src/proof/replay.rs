@@ -225,11 +225,14 @@ impl Case<'_> {
                 EventKind::SpindleOff | EventKind::End => {
                     running &= e.kind == EventKind::End;
                     ended |= e.kind == EventKind::End;
-                    let tip = e.at_move.checked_sub(1).and_then(|k| self.program.moves.get(k));
-                    if let Some(m) = tip
-                        && m.to.z < -LENGTH_SLACK_MM
-                    {
-                        self.fail(FailureKind::EndInWood, e.line, m.to, -m.to.z, 0.0);
+                    // The tip stands where the move before led, in a part that goes on where its first one begins.
+                    let tip = match e.at_move.checked_sub(1) {
+                        Some(k) => self.program.moves.get(k).map(|m| m.to),
+                        None if self.part.opens => None,
+                        None => self.program.moves.first().map(|m| m.from),
+                    };
+                    if let Some(tip) = tip.filter(|tip| tip.z < -LENGTH_SLACK_MM) {
+                        self.fail(FailureKind::EndInWood, e.line, tip, -tip.z, 0.0);
                     }
                 }
                 EventKind::Dwell { .. }
@@ -503,6 +506,8 @@ impl Case<'_> {
         for (k, (m, c)) in self.program.moves.iter().zip(contacts).enumerate() {
             while let Some(e) = events.next_if(|e| e.at_move <= k) {
                 match e.kind {
+                    // M3 without a speed turns nothing.
+                    EventKind::SpindleOn { rpm, .. } if rpm <= 0.0 => running = false,
                     EventKind::SpindleOn { .. } if running => {}
                     EventKind::SpindleOn { .. } => (running, waited_s) = (true, 0.0),
                     EventKind::SpindleOff | EventKind::End => running = false,
@@ -585,8 +590,9 @@ fn fastest_along(m: &Move, max_rate: DVec3) -> f64 {
 fn check_travel(parts: &[Part], setup: &Setup, ledger: &mut Ledger) {
     let stock = setup.stock.bounds();
     let middle = stock.center().extend(-0.5 * setup.stock.thickness_mm);
-    let moves = || parts.iter().flat_map(|p| p.program.moves.iter().map(move |m| (p, m)));
     for axis in 0..3 {
+        // Where nobody has told the tip's place, it is as good as any.
+        let moves = || parts.iter().flat_map(|p| p.program.told_moves(axis).map(move |m| (p, m)));
         let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
         let mut far: Option<(&Part, &Move)> = None;
         for (part, m) in moves() {

@@ -595,7 +595,11 @@ fn the_second_oracle_sees_a_wrong_replay() {
     let tracks = [Track { cutter: &job.operations[0].cutter, moves: &moves }];
     let judge = |carved: &Heightfield| {
         let mut ledger = Ledger::default();
-        let held = deviation::hold(carved, &target, &target, &Setup::from(&job));
+        let held = deviation::hold(
+            carved,
+            Wanted { target: &target, floor: &target, reach: &target },
+            &Setup::from(&job),
+        );
         deviation::judge_oracles(&held, carved, &tracks, &mut ledger);
         ledger.into_failures(Manners::Own).0
     };

@@ -4,6 +4,7 @@ use super::Args;
 use super::hints::Described;
 use super::place::Source;
 use crate::job::{CutterShape, CutterSpec, Library};
+use crate::proof::Part;
 use anyhow::{Result, anyhow, bail};
 
 /// Where cutters are looked for.
@@ -65,6 +66,19 @@ impl Cutters<'_> {
                     self.args.programs.len()
                 ),
             },
+        }
+    }
+
+    /// One cutter for several tools of a program may not be meant.
+    pub(super) fn note_shared(&self, parts: &[Part], notes: &mut Vec<String>) {
+        if let ([name], true) = (&self.args.cutters[..], parts.len() > 1) {
+            let names: Vec<_> = parts.iter().filter(|p| p.cutter.name == *name).collect();
+            if let [_, .., last] = names[..] {
+                notes.push(format!(
+                    "{} runs with {name}, too (--tool N=NAME tells another cutter)",
+                    last.name
+                ));
+            }
         }
     }
 

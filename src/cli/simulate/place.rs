@@ -25,6 +25,8 @@ pub(super) struct Ready {
     pub(super) parts: Vec<Part>,
     pub(super) grid: Grid,
     pub(super) target: Option<Heightfield>,
+    /// What is cut below this is a gouge, where that is not the target itself.
+    pub(super) floor: Option<Heightfield>,
     /// The lowest surface that the cutters can leave of the target.
     pub(super) reach: Option<Heightfield>,
     /// Cross-sections that were asked for.
@@ -107,6 +109,7 @@ pub(super) fn prepare(args: &Args, enter: &mut dyn FnMut(&str)) -> Result<Ready,
         title: job.title,
         grid: *target.grid(),
         target: Some(target),
+        floor: None,
         reach: Some(reach),
         cuts: cuts(args),
         smaller: smaller(&input.library, &parts),
@@ -224,11 +227,12 @@ fn without_job(
     let title = header.title.clone().unwrap_or_else(|| sources[0].name.clone());
     let target =
         args.target.as_ref().map(|path| target(args, path, &setup.stock, &grid, &mut notes));
-    let target = target.transpose()?;
+    let (target, floor) =
+        target.transpose()?.map_or((None, None), |read| (Some(read.field), read.floor));
     let profiles: Vec<Profile> = parts.iter().map(|p| Profile::of(&p.cutter)).collect();
     let reach = target.as_ref().map(|target| offset::reach_of(target, &profiles));
     let (cuts, smaller) = (cuts(args), smaller(library, &parts));
-    Ok(Ready { title, setup, parts, grid, target, reach, cuts, smaller, notes })
+    Ok(Ready { title, setup, parts, grid, target, floor, reach, cuts, smaller, notes })
 }
 
 const DEFAULT_MACHINE: &str = "shapeoko3";
@@ -285,6 +289,7 @@ fn parts(
     notes: &mut Vec<String>,
 ) -> Result<Vec<Part>> {
     let (mut parts, mut zero) = (Vec::new(), None);
+    let unknown = frame.start;
     for (k, source) in sources.iter().enumerate() {
         let program = read(source, machine, &frame)?;
         if let Some(number) = program.assumed_zero {
@@ -296,13 +301,20 @@ fn parts(
                 );
             }
         }
-        if let Some(end) = program.end {
-            frame.start = Start::Known(end);
+        if let Some(line) = program.zero_line.filter(|_| k + 1 < sources.len()) {
+            bail!(
+                "{} line {line} sets a zero that is still in force at its end; controllers keep it for the next program, which \
+                 is not followed here: clear it (G92.1), or simulate one program at a time with --offset",
+                source.name
+            );
         }
+        frame.start = program.end.map_or(unknown, Start::Known);
         notes.extend(program.notes.iter().map(|note| format!("{}: {note}", source.name)));
+        let before = parts.len();
         parts.extend(Part::split(&source.name, program, |tool| {
             cutters.find(k, source, tool, notes)
         })?);
+        cutters.note_shared(&parts[before..], notes);
     }
     Ok(parts)
 }
@@ -325,7 +337,7 @@ fn target(
     stock: &Stock,
     grid: &Grid,
     notes: &mut Vec<String>,
-) -> Result<Heightfield> {
+) -> Result<heights::Read> {
     let given = args.target_z.map(|z| Given {
         z_black_mm: z.x,
         z_white_mm: z.y,
@@ -339,8 +351,15 @@ fn target(
         };
         anyhow!("{}: {e}{cure}", path.display())
     })?;
-    notes.extend(read.notes);
-    Ok(read.field)
+    notes.extend(read.notes.iter().cloned());
+    if read.floor.is_some() {
+        notes.push(format!(
+            "the mesh is known at nodes {} mm apart: where walls stand or slopes meet floors, cuts that are that far to the side \
+             of them are no gouges (--pitch)",
+            grid.pitch_mm
+        ));
+    }
+    Ok(read)
 }
 
 fn cuts(args: &Args) -> Vec<Cut> {

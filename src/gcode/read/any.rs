@@ -236,11 +236,15 @@ impl Foreign<'_> {
             self.note(Topic::Skip, text);
         }
         self.core.refuse_after_end()?;
+        let before = self.core.program.moves.len();
         // On most lines no other word acts; but G93 counts for each line anew.
         if !self.core.line.has_axes_alone() || self.feed_mode == FeedMode::Inverse {
             self.obey_words_before_motion()?;
         }
         self.obey_motion()?;
+        if self.told != [true; 3] || self.lost != [false; 3] {
+            self.note_guesses(before);
+        }
         self.core.refuse_unused()?;
         if let Some(optional) = self.more.optional_stop {
             self.core.event(EventKind::Stop { optional });
@@ -449,7 +453,26 @@ impl Foreign<'_> {
         self.core.number += ends as u32 + u32::from(open);
     }
 
+    /// Where the tip stands after the line is a guess in some axis: so are the ends of its moves.
+    fn note_guesses(&mut self, before: usize) {
+        let program = &mut self.core.program;
+        let after = program.moves.len();
+        if before == after {
+            return;
+        }
+        for (axis, guessed) in program.guessed.iter_mut().enumerate() {
+            if self.told[axis] && !self.lost[axis] {
+                continue;
+            }
+            match guessed.last_mut() {
+                Some(last) if last.end == before => last.end = after,
+                _ => guessed.push(before..after),
+            }
+        }
+    }
+
     fn finish(&mut self) {
+        self.core.program.zero_line = self.offsets.changed();
         let is_told = self.told == [true; 3] && self.lost == [false; 3];
         self.core.program.end = is_told.then_some(self.core.at);
         let changes = |e: &Event| matches!(e.kind, EventKind::Tool { .. });

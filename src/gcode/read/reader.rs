@@ -79,6 +79,8 @@ impl Reader<'_> {
                 blind_line: None,
                 first_z: None,
                 end: None,
+                guessed: [const { Vec::new() }; 3],
+                zero_line: None,
                 assumed_zero: None,
                 notes: Vec::new(),
             },

@@ -24,6 +24,9 @@ pub(super) struct Offsets {
     /// The shift of G92 in force, and the one that G92.3 brings back.
     shift_mm: DVec3,
     kept_shift_mm: DVec3,
+    /// Line of the last G10 that moved a zero, and of the last G92.
+    moved_line: Option<u32>,
+    shift_line: u32,
 }
 
 impl Offsets {
@@ -40,7 +43,14 @@ impl Offsets {
             is_settled: false,
             shift_mm: DVec3::ZERO,
             kept_shift_mm: DVec3::ZERO,
+            moved_line: None,
+            shift_line: 0,
         }
+    }
+
+    /// The line that set a zero which is in force and was not at the start.
+    pub(super) fn changed(&self) -> Option<u32> {
+        self.moved_line.or((self.shift_mm != DVec3::ZERO).then_some(self.shift_line))
     }
 
     /// Takes a work offset into force.
@@ -227,6 +237,9 @@ impl Foreign<'_> {
                 machine_zero_mm[axis] + v
             };
         }
+        if self.offsets.zeros_mm[k].unwrap_or(DVec3::ZERO) != zero_mm {
+            self.offsets.moved_line = Some(self.core.number);
+        }
         self.offsets.zeros_mm[k] = Some(zero_mm);
         self.offsets.is_settled = false;
         Ok(())
@@ -249,6 +262,7 @@ impl Foreign<'_> {
             }
         }
         self.offsets.kept_shift_mm = self.offsets.shift_mm;
+        self.offsets.shift_line = self.core.number;
         self.offsets.is_settled = false;
         Ok(())
     }

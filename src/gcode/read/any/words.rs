@@ -239,6 +239,12 @@ fn word(
             if (value * 10.0 - f64::from(tenths)).abs() > 1e-6 || tenths >= 1000 {
                 return refused(if letter == b'M' { MACRO } else { UNKNOWN });
             }
+            // The older names of G20 and G21, which Mach3 still knows and some posts write.
+            let (tenths, value) = match (letter, tenths) {
+                (b'G', 700) => (200, 20.0),
+                (b'G', 710) => (210, 21.0),
+                _ => (tenths, value),
+            };
             line.mark(letter, column);
             if more.is_new(letter, tenths) {
                 let known =
