@@ -119,7 +119,7 @@ pub struct Verdict {
     /// What is left above the target; all 0 without one.
     pub leftover: Leftover,
     /// The deepest penetration into the target found at nodes and halfway between them, also when it is within the tolerance;
-    /// that of moves into walls where it is beyond it.
+    /// that of moves into walls where it is beyond it. Counted from [`Wanted::floor`].
     pub gouge: Option<Gouge>,
     /// What each part does, in order.
     pub programs: Vec<ProgramReport>,

@@ -57,8 +57,7 @@ pub(super) fn of(verdict: &Verdict, setup: &Setup, has_target: bool) -> Vec<Chec
             verdict.leftover.over_fraction * 100.0,
             verdict.leftover.over_max_mm
         );
-        let name =
-            format!("no leftover above {} mm where cutters reach", setup.leftover_limit_mm());
+        let name = format!("no leftover above {} mm where cutters reach", setup.leftover_limit_mm);
         add(&name, &[K::Leftover], over);
     }
     rows.into_iter()

@@ -148,6 +148,7 @@ impl Args {
         ] {
             *limit = given.or(*limit);
         }
+        setup.leftover_limit_mm = self.max_left.unwrap_or(setup.leftover_limit_mm);
         Ok(())
     }
 }
@@ -182,6 +183,16 @@ pub(super) fn run(args: &Args) -> Result<(), Stop> {
     }
     stages.enter("reach");
     let would_reach = would_reach(&ready);
+    if outputs.is_some() && !args.meshes {
+        let old: Vec<&str> = MESHES.into_iter().filter(|name| folder.join(name).exists()).collect();
+        if !old.is_empty() {
+            ready.notes.push(format!(
+                "{} in {} are of another run",
+                old.join(", "),
+                folder.display()
+            ));
+        }
+    }
     let done = Simulated { ready, verdict, would_reach };
     if let Some(outputs) = &mut outputs {
         stages.enter("pictures");
@@ -205,6 +216,9 @@ pub(super) fn run(args: &Args) -> Result<(), Stop> {
     }
     if passed { Ok(()) } else { Err(Stop::CheckFailed(told::failures(&done.verdict))) }
 }
+
+/// The meshes that are written when asked for.
+const MESHES: [&str; 4] = ["carved.stl", "carved.obj", "relief.stl", "relief.obj"];
 
 /// What is said when no move meets wood.
 const NOTHING_CUT: &str = "nothing is cut: no move meets wood; Z0 is the stock's top here (where the programs' lies at its underside: \

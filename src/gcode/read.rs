@@ -53,9 +53,13 @@ pub struct Program {
 }
 
 impl Program {
-    /// The moves whose end along an axis (0 for X) is told.
+    /// The moves whose end along an axis (0 for X) is told. Where none is and the axis moves all the same (steps alone, G91),
+    /// all of them: how far they lead from each other is known.
     pub fn told_moves(&self, axis: usize) -> impl Iterator<Item = &Move> {
         let guessed = &self.guessed[axis];
+        let is_untold = guessed.iter().map(Range::len).sum::<usize>() == self.moves.len();
+        let steps = is_untold && self.moves.iter().any(|m| m.from[axis] != m.to[axis]);
+        let guessed = if steps { [].as_slice() } else { guessed.as_slice() };
         self.moves
             .iter()
             .enumerate()

@@ -158,7 +158,7 @@ pub(super) fn hold(
     let (terrain, reached) = (Terrain::new(target), Terrain::new(reach));
     let lowest = Terrain::new(floor);
     let tolerance = setup.tolerance;
-    let limit = setup.leftover_limit_mm();
+    let limit = setup.leftover_limit_mm;
     let stock = setup.stock.bounds().grown(1e-9);
     let mut deviation = vec![0.0_f32; grid.len()];
     let mut unreachable = vec![false; grid.len()];
@@ -318,7 +318,7 @@ fn judge_walls(
 /// A strict job, or one with a limit, answers for every node that its cutters reach.
 pub(super) fn judge_leftover(held: &Held, setup: &Setup, ledger: &mut Ledger) {
     if let (true, Some(spot)) = (setup.judges_leftover(), held.over.worst) {
-        let limit = setup.leftover_limit_mm();
+        let limit = setup.leftover_limit_mm;
         let (kind, amount, at) = (FailureKind::Leftover, spot.amount, spot.at);
         let finding = Finding { kind, program: "", line: 0, at, amount, limit };
         ledger.note(finding, held.over.count);

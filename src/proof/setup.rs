@@ -20,6 +20,8 @@ pub struct Setup {
     pub clearance_mm: f64,
     /// What else is a failure.
     pub limits: Limits,
+    /// More than this left above what the cutters reach counts as too much, mm: that of the limits, else scallop + gouge.
+    pub leftover_limit_mm: f64,
     /// When true, leftover above scallop + gouge where a cutter reaches is a failure.
     pub strict: bool,
     /// What may be done with each cutter: feed, plunge, spindle speed.
@@ -58,12 +60,7 @@ impl Manners {
 }
 
 impl Setup {
-    /// More than this left above what the cutters reach counts as too much, mm.
-    pub fn leftover_limit_mm(&self) -> f64 {
-        self.limits.leftover_mm.unwrap_or(self.tolerance.scallop_mm + self.tolerance.gouge_mm)
-    }
-
-    /// True where that fails the proof.
+    /// True where too much leftover fails the proof.
     pub fn judges_leftover(&self) -> bool {
         self.strict || self.limits.leftover_mm.is_some()
     }
@@ -77,6 +74,8 @@ impl From<&Job> for Setup {
             keep_outs: job.keep_outs.clone(),
             tolerance: job.tolerance,
             limits: job.limits,
+            leftover_limit_mm: (job.limits.leftover_mm)
+                .unwrap_or(job.tolerance.scallop_mm + job.tolerance.gouge_mm),
             safe_z_mm: job.safe_z_mm,
             clearance_mm: job.clearance_mm,
             strict: job.strict,

@@ -44,6 +44,17 @@ impl Cutters<'_> {
                 if let [only, others @ ..] = self.job
                     && others.iter().all(|o| o == only)
                 {
+                    let hint = source.hints.tool(tool);
+                    if let Some(hint) = hint.filter(|h| !is_like(only, &h.shape, h.diameter_mm)) {
+                        let said = &hint.comment;
+                        note(
+                            notes,
+                            format!(
+                                "{} says '{said}', but the job's {} is taken",
+                                source.name, only.name
+                            ),
+                        );
+                    }
                     return Ok((*only).clone());
                 }
                 if let Some(hint) = source.hints.tool(tool) {
@@ -71,14 +82,14 @@ impl Cutters<'_> {
 
     /// One cutter for several tools of a program may not be meant.
     pub(super) fn note_shared(&self, parts: &[Part], notes: &mut Vec<String>) {
-        if let ([name], true) = (&self.args.cutters[..], parts.len() > 1) {
-            let names: Vec<_> = parts.iter().filter(|p| p.cutter.name == *name).collect();
-            if let [_, .., last] = names[..] {
-                notes.push(format!(
-                    "{} runs with {name}, too (--tool N=NAME tells another cutter)",
-                    last.name
-                ));
-            }
+        let [first, others @ ..] = parts else { return };
+        let is_shared = |part: &&Part| self.args.cutters.len() == 1 && part.cutter == first.cutter;
+        for part in others.iter().filter(is_shared) {
+            let name = &part.cutter.name;
+            note(
+                notes,
+                format!("{} runs with {name}, too (--tool N=NAME tells another cutter)", part.name),
+            );
         }
     }
 
@@ -132,9 +143,14 @@ impl Cutters<'_> {
         if is_known {
             return cutter.name.clone();
         }
+        let short = |mm: f64| (mm * 1e3).round() / 1e3;
         format!(
             "{} with {} flutes {} mm long, a shank of {} mm, {} mm out of the collet",
-            cutter.name, cutter.flutes, cutter.flute_mm, cutter.shank_mm, cutter.stickout_mm
+            cutter.name,
+            cutter.flutes,
+            short(cutter.flute_mm),
+            short(cutter.shank_mm),
+            short(cutter.stickout_mm)
         )
     }
 }

@@ -20,8 +20,8 @@ use crate::job::CutterShape;
 /// What the comments of a program say.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(super) struct Hints {
-    /// Tool number (`None`: before any is called), form, and the comment.
-    pub(super) tools: Vec<(Option<u32>, Described)>,
+    /// Tool number (`None`: before any is called), and its form where that is understood.
+    tools: Vec<(Option<u32>, Option<Described>)>,
     /// Size of the stock and the zero's place on its lower left corner, mm.
     pub(super) stock: Option<(DVec3, DVec2)>,
 }
@@ -48,43 +48,42 @@ impl Hints {
         let text = String::from_utf8_lossy(bytes);
         let unit_mm = if is_inch(&text) { 25.4 } else { 1.0 };
         let mut hints = Self::default();
-        let mut waiting: Option<Described> = None;
+        let mut milled_tools = Vec::new();
+        let mut waiting: Option<Option<Described>> = None;
+        // A number without a comment before it: then comments stand elsewhere, and may mean another tool.
+        let mut is_bare = false;
         // Programs have millions of lines, and few of them a comment or a tool.
         let may_tell = |line: &&str| line.contains(['(', ';', 'T', 't']);
         for (code, comments) in text.lines().filter(may_tell).map(parted) {
             for comment in comments {
                 if let Some((number, tool)) = headed(comment, unit_mm) {
-                    hints.add(Some(number), tool);
-                } else if let Some(tool) = milled(comment, unit_mm) {
-                    waiting = Some(tool);
+                    hints.tools.push((Some(number), tool));
+                } else if comment.get(..5).is_some_and(|head| head.eq_ignore_ascii_case("TOOL/")) {
+                    waiting = Some(milled(comment, unit_mm));
                 } else if hints.stock.is_none() {
                     hints.stock = block(comment, unit_mm);
                 }
             }
-            if let Some(number) = tool_of(&code)
-                && let Some(tool) = waiting.take()
-            {
-                hints.add(Some(number), tool);
+            if let Some(number) = tool_of(&code) {
+                is_bare |= waiting.is_none();
+                milled_tools.extend(waiting.take().map(|tool| (Some(number), tool)));
             }
         }
-        if let Some(tool) = waiting {
-            hints.add(None, tool);
+        milled_tools.extend(waiting.map(|tool| (None, tool)));
+        if !is_bare {
+            hints.tools.extend(milled_tools);
         }
         hints
     }
 
-    /// The cutter of a tool number; none where comments contradict each other. Where the program calls no tool, the only
-    /// one described.
+    /// The cutter of a tool number; none where a comment on it is not understood, or they contradict each other. Before any
+    /// tool is called, the only one described.
     pub(super) fn tool(&self, number: Option<u32>) -> Option<&Described> {
-        let own: Vec<_> =
-            self.tools.iter().filter(|t| number.is_none() || t.0 == number).map(|t| &t.1).collect();
+        let own = self.tools.iter().filter(|t| number.is_none() || t.0 == number);
+        let own: Vec<&Described> = own.map(|t| t.1.as_ref()).collect::<Option<_>>()?;
         let first = *own.first()?;
         let same = |t: &&Described| t.shape == first.shape && t.diameter_mm == first.diameter_mm;
         own.iter().all(same).then_some(first)
-    }
-
-    fn add(&mut self, number: Option<u32>, tool: Described) {
-        self.tools.push((number, tool));
     }
 }
 
@@ -107,12 +106,13 @@ fn parted(line: &str) -> (String, Vec<&str>) {
 /// True where the first unit that the program sets is the inch.
 fn is_inch(text: &str) -> bool {
     let is_word = |code: &str, k: usize| !code[k + 3..].starts_with(|c: char| c.is_ascii_digit());
-    let at = |code: &str, word: &str| code.find(word).filter(|&k| is_word(code, k));
+    let one = |code: &str, word: &str| code.find(word).is_some_and(|k| is_word(code, k));
+    let at = |code: &str, words: [&str; 2]| words.iter().any(|word| one(code, word));
     let first = text.lines().filter(|line| line.contains(['G', 'g'])).find_map(|line| {
         let (code, _) = parted(line);
-        match (at(&code, "G20"), at(&code, "G21")) {
-            (None, None) => None,
-            (inch, mm) => Some(inch.is_some() && mm.is_none()),
+        match (at(&code, ["G20", "G70"]), at(&code, ["G21", "G71"])) {
+            (false, false) => None,
+            (inch, mm) => Some(inch && !mm),
         }
     });
     first.unwrap_or(false)
@@ -125,37 +125,45 @@ fn tool_of(code: &str) -> Option<u32> {
     digits[..end].parse().ok()
 }
 
-/// `T1 D=3.175 CR=0. - ZMIN=-4.2 - FLAT END MILL`.
-fn headed(comment: &str, unit_mm: f64) -> Option<(u32, Described)> {
+/// `T1 D=3.175 CR=0. - ZMIN=-4.2 - FLAT END MILL`: its number, and its form where that is understood.
+fn headed(comment: &str, unit_mm: f64) -> Option<(u32, Option<Described>)> {
     let words = comment.to_ascii_uppercase();
     let number = tool_of(words.split_whitespace().next().filter(|w| w.starts_with('T'))?)?;
     let value = |key: &str| {
         let word = words.split_whitespace().find_map(|w| w.strip_prefix(key))?;
         word.trim_end_matches("DEG").parse::<f64>().ok().filter(|v| v.is_finite())
     };
-    let (diameter, corner) = (value("D=")?, value("CR=").unwrap_or(0.0));
-    let kind = words.rsplit(" - ").next().unwrap_or("");
-    let has = |names: &[&str]| names.iter().any(|name| kind.contains(name));
-    let shape = match value("TAPER=").filter(|t| *t > 0.0) {
+    let diameter = value("D=")?;
+    let has = |names: &[&str]| names.iter().any(|name| words.contains(name));
+    let taper = value("TAPER=").filter(|taper| *taper > 0.0);
+    let shape = match (taper, has(&["DRILL"]), has(&["CHAMFER", "ENGRAV"])) {
         // A drill's is the angle of its whole point, those of others the angle of a side.
-        Some(taper) if has(&["DRILL"]) => cone(taper, 0.0)?,
-        Some(taper) if has(&["CHAMFER", "ENGRAV"]) => cone(2.0 * taper, 0.0)?,
-        Some(_) => return None,
-        None if has(&[
-            "DRILL", "TAP", "THREAD", "LOLLIPOP", "DOVETAIL", "SLOT", "FORM", "SAW", "RADIUS",
-            "CHAMFER", "ENGRAV", "COUNTER", "BORING", "PROBE", "REAMER",
-        ]) =>
-        {
-            return None;
+        (Some(taper), true, false) => cone(taper, 0.0),
+        (Some(taper), false, true) => cone(2.0 * taper, 0.0),
+        (None, false, false) if !has(&OTHERS) => {
+            value("CR=").and_then(|corner| round(diameter, corner))
         }
-        None => round(diameter, corner)?,
+        _ => None,
     };
-    let shape = scaled(shape, unit_mm);
-    Some((
-        number,
-        Described { shape, diameter_mm: diameter * unit_mm, comment: comment.to_owned() },
-    ))
+    let contradicts = |shape: &CutterShape| match shape {
+        CutterShape::Flat => has(&["BALL", "BULL"]),
+        CutterShape::Ball => has(&["BULL", "FLAT"]),
+        CutterShape::Bull { .. } => has(&["BALL", "FLAT"]),
+        _ => false,
+    };
+    let described = shape.filter(|shape| !contradicts(shape)).map(|shape| Described {
+        shape: scaled(shape, unit_mm),
+        diameter_mm: diameter * unit_mm,
+        comment: comment.to_owned(),
+    });
+    Some((number, described))
 }
+
+/// Words for tools of other forms.
+const OTHERS: [&str; 13] = [
+    "TAP ", "THREAD", "LOLLIPOP", "DOVETAIL", "SLOT", "FORM", "SAW", "RADIUS", "COUNTER", "BORING",
+    "PROBE", "REAMER", "TAPERED",
+];
 
 /// `TOOL/MILL,6.35, 3.17, 0.00, 0.00`.
 fn milled(comment: &str, unit_mm: f64) -> Option<Described> {
@@ -231,7 +239,7 @@ mod tests {
         Hints::of(text.as_bytes())
             .tools
             .into_iter()
-            .map(|(number, tool)| (number, tool.shape, tool.diameter_mm))
+            .filter_map(|(number, tool)| tool.map(|tool| (number, tool.shape, tool.diameter_mm)))
             .collect()
     }
 
@@ -253,8 +261,10 @@ mod tests {
             ]
         );
         // In a program in inches the lengths are inches.
-        let inch = tools("(T2  D=0.25 CR=0.125 - ZMIN=-0.0311 - BALL)\nG90 G94\nG20\n");
-        assert_eq!(inch, [(Some(2), CutterShape::Ball, 6.35)]);
+        for inch in ["G20", "G70", "N10G70G91.1"] {
+            let text = format!("(T2  D=0.25 CR=0.125 - ZMIN=-0.0311 - BALL)\nG90 G94\n{inch}\n");
+            assert_eq!(tools(&text), [(Some(2), CutterShape::Ball, 6.35)], "{inch}");
+        }
     }
 
     #[test]
@@ -284,14 +294,26 @@ mod tests {
 
     #[test]
     fn what_is_not_said_or_contradicts_itself_is_no_hint() {
-        assert_eq!(
-            Hints::of(b"(T1 2-flute 6 mm)\n(TOOL/MILL,6.35)\n(TOOL/DRILL,3,118,20)\nG21T1M6"),
-            Hints::default()
-        );
-        assert_eq!(
-            Hints::of(b"\xff\xfe(TOOL/MILL,nan,0,0,0)\n(T1 D=-6. CR=0. - FLAT)"),
-            Hints::default()
-        );
+        let none = |text: &[u8], number| {
+            let hints = Hints::of(text);
+            assert_eq!(
+                (hints.tool(number), hints.stock),
+                (None, None),
+                "{:?}",
+                text.escape_ascii()
+            );
+        };
+        none(b"(T1 2-flute 6 mm)\n(TOOL/MILL,6.35)\nG21T1M6", Some(1));
+        none(b"(TOOL/DRILL,3,118,20)\nG21T1M6", Some(1));
+        none(b"\xff\xfe(TOOL/MILL,nan,0,0,0)\n(T1 D=-6. CR=0. - FLAT)", Some(1));
+        // No corner, or one that the words gainsay; a kind of tool that stands in the middle.
+        none(b"(T2 D=6. - ZMIN=-2. - BALL END MILL)", Some(2));
+        none(b"(T2 D=6. CR=0. - ZMIN=-2. - BALL END MILL)", Some(2));
+        none(b"(T5 D=3. CR=0. - DRILL - ZMIN=-9)", Some(5));
+        // Of two tools one is not understood: the other one is not the only one.
+        none(b"(T1 D=6. CR=0. - FLAT END MILL)\n(T2 D=3. CR=0. - DOVETAIL MILL)", None);
+        // Comments behind the tool's number are not those of the next one.
+        none(b"M6T1\n(TOOL/MILL,6,0,20,0)\nG1X1\nM6T2\n(TOOL/MILL,3,0,20,0)", Some(2));
         // The zero lies at the bottom: not ours.
         assert_eq!(Hints::of(b"(STOCK/BLOCK,100,80,12,0,0,0)").stock, None);
         let twice = Hints::of(b"(T1 D=6. CR=0. - FLAT)\n(T1 D=5. CR=0. - FLAT)");

@@ -215,6 +215,7 @@ fn without_job(
         safe_z_mm: 0.0,
         clearance_mm: CLEARANCE_MM,
         limits: Limits::default(),
+        leftover_limit_mm: Tolerance::default().scallop_mm + Tolerance::default().gouge_mm,
         strict: false,
         operations: Vec::new(),
         zero_mm: args.zero,
@@ -354,8 +355,8 @@ fn target(
     notes.extend(read.notes.iter().cloned());
     if read.floor.is_some() {
         notes.push(format!(
-            "the mesh is known at nodes {} mm apart: where walls stand or slopes meet floors, cuts that are that far to the side \
-             of them are no gouges (--pitch)",
+            "the mesh is known at nodes {} mm apart: within two of these beside upright walls, and in sharp valleys, cuts are no \
+             gouges, and ribs narrower than that are not guarded (--pitch)",
             grid.pitch_mm
         ));
     }

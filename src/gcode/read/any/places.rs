@@ -25,8 +25,10 @@ pub(super) struct Offsets {
     shift_mm: DVec3,
     kept_shift_mm: DVec3,
     /// Line of the last G10 that moved a zero, and of the last G92.
-    moved_line: Option<u32>,
+    moved_line: u32,
     shift_line: u32,
+    /// The zeros at the start.
+    first_mm: [Option<DVec3>; 6],
 }
 
 impl Offsets {
@@ -43,14 +45,21 @@ impl Offsets {
             is_settled: false,
             shift_mm: DVec3::ZERO,
             kept_shift_mm: DVec3::ZERO,
-            moved_line: None,
+            moved_line: 0,
             shift_line: 0,
+            first_mm: zeros_mm,
         }
     }
 
     /// The line that set a zero which is in force and was not at the start.
     pub(super) fn changed(&self) -> Option<u32> {
-        self.moved_line.or((self.shift_mm != DVec3::ZERO).then_some(self.shift_line))
+        let at = |zero_mm: Option<DVec3>| zero_mm.unwrap_or(DVec3::ZERO);
+        let same = self.zeros_mm.iter().zip(&self.first_mm).all(|(a, b)| at(*a) == at(*b));
+        match (same, self.shift_mm == DVec3::ZERO) {
+            (false, _) => Some(self.moved_line),
+            (true, false) => Some(self.shift_line),
+            (true, true) => None,
+        }
     }
 
     /// Takes a work offset into force.
@@ -237,9 +246,7 @@ impl Foreign<'_> {
                 machine_zero_mm[axis] + v
             };
         }
-        if self.offsets.zeros_mm[k].unwrap_or(DVec3::ZERO) != zero_mm {
-            self.offsets.moved_line = Some(self.core.number);
-        }
+        self.offsets.moved_line = self.core.number;
         self.offsets.zeros_mm[k] = Some(zero_mm);
         self.offsets.is_settled = false;
         Ok(())
