@@ -396,6 +396,10 @@ fn torus(r: f64, radius: f64, aside: f64, slope: f64, mut lo: f64, mut hi: f64) 
         let fall = 2.0 * u * chord + 2.0 * u * u * at - 2.0 * g2 * at * (p2 - u * u)
             + 2.0 * g2 * at * at * u;
         let mut step = -value / fall;
+        // Found; the bracket may end just here, and halving it would lead away.
+        if step.abs() <= FOUND_PER_RADIUS * radius {
+            break;
+        }
         let is_good = u + step > lo && u + step < hi && step.abs() <= 0.5 * before;
         if !is_good {
             step = 0.5 * (lo + hi) - u;
