@@ -4,7 +4,8 @@ use super::{Stop, checks, rows};
 use crate::CarveError;
 use crate::Carving;
 use crate::cutter::Profile;
-use crate::job::{Job, SurfaceSpec};
+use crate::geom::{Grid, Move};
+use crate::job::{CutterSpec, Job, Stock, SurfaceSpec};
 use crate::proof::{ProofError, Setup};
 use crate::report::{
     self, Board, ColorBy, Cut, CutterIn, DeviationScale, LayerRow, Look, Occasion, Picture,
@@ -119,7 +120,21 @@ fn drawn(carving: &Carving, meshes: Meshes) -> Result<Vec<Made>, ReportError> {
                 report::paths_png(&paths, board, ColorBy::Feed, &title("toolpaths by feed"))
             }),
         ),
-        ("steps.png", Box::new(|| steps(carving, wood, &title("before and after each program")))),
+        (
+            "steps.png",
+            Box::new(|| {
+                let runs =
+                    runs().map(|(p, path)| (p.name.as_str(), &path.cutter, path.moves.as_slice()));
+                let runs: Vec<_> = runs.collect();
+                steps(
+                    &job.stock,
+                    target.grid(),
+                    &runs,
+                    wood,
+                    &title("before and after each program"),
+                )
+            }),
+        ),
         ("sections.png", Box::new(|| sections(carving, wood, &title("cross-sections")))),
         ("depth.png", Box::new(|| report::depth_png(target))),
         ("carved-depth.png", Box::new(|| report::depth_png(&verdict.carved))),
@@ -133,19 +148,23 @@ fn drawn(carving: &Carving, meshes: Meshes) -> Result<Vec<Made>, ReportError> {
     jobs.par_iter().map(|(name, make)| Ok(((*name).to_string(), make()?))).collect()
 }
 
-/// The stock before and after each program.
-fn steps(carving: &Carving, look: Look, title: &str) -> Result<Vec<u8>, ReportError> {
-    let profiles: Vec<Profile> = carving.paths.iter().map(|p| Profile::of(&p.cutter)).collect();
-    let runs: Vec<_> =
-        profiles.iter().zip(&carving.paths).map(|(p, path)| (p, path.moves.as_slice())).collect();
-    let stock = &carving.design.job.stock;
-    let stages = report::stages(stock, carving.verdict.carved.grid(), &runs);
-    let names = carving.programs.iter().zip(&carving.paths);
-    let steps: Vec<Step<'_>> = names
+/// The stock before and after each run of a cutter: name, cutter and moves.
+pub(super) fn steps(
+    stock: &Stock,
+    grid: &Grid,
+    runs: &[(&str, &CutterSpec, &[Move])],
+    look: Look,
+    title: &str,
+) -> Result<Vec<u8>, ReportError> {
+    let profiles: Vec<Profile> = runs.iter().map(|run| Profile::of(run.1)).collect();
+    let swept: Vec<_> = profiles.iter().zip(runs).map(|(profile, run)| (profile, run.2)).collect();
+    let stages = report::stages(stock, grid, &swept);
+    let steps: Vec<Step<'_>> = runs
+        .iter()
         .zip(stages.windows(2))
-        .map(|((program, path), stage)| Step {
-            name: &program.name,
-            cutter: &path.cutter.name,
+        .map(|(&(name, cutter, _), stage)| Step {
+            name,
+            cutter: &cutter.name,
             before: &stage[0],
             after: &stage[1],
         })

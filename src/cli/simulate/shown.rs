@@ -9,7 +9,7 @@ use crate::geom::MoveKind;
 use crate::proof::Part;
 use crate::report::{
     self, Board, ColorBy, Cut, CutterIn, DeviationScale, Look, Occasion, ReportData, ReportError,
-    Sections, Step,
+    Sections,
 };
 use rayon::prelude::*;
 
@@ -49,7 +49,19 @@ fn drawn(done: &Simulated, meshes: bool) -> Result<Vec<Made>, ReportError> {
     if ready.parts.len() <= MOST_STEPS {
         jobs.push((
             "steps.png",
-            Box::new(|| steps(done, wood, &title("before and after each cutter"))),
+            Box::new(|| {
+                let parts = ready.parts.iter();
+                let runs: Vec<_> = parts
+                    .map(|p| (p.name.as_str(), &p.cutter, p.program.moves.as_slice()))
+                    .collect();
+                outcome::steps(
+                    stock,
+                    &ready.grid,
+                    &runs,
+                    wood,
+                    &title("before and after each cutter"),
+                )
+            }),
         ));
     }
     if let Some(target) = &ready.target {
@@ -77,26 +89,6 @@ fn drawn(done: &Simulated, meshes: bool) -> Result<Vec<Made>, ReportError> {
         }
     }
     jobs.par_iter().map(|(name, make)| Ok(((*name).to_owned(), make()?))).collect()
-}
-
-/// The stock before and after each part.
-fn steps(done: &Simulated, look: Look, title: &str) -> Result<Vec<u8>, ReportError> {
-    let parts = &done.ready.parts;
-    let profiles: Vec<Profile> = parts.iter().map(|p| Profile::of(&p.cutter)).collect();
-    let runs: Vec<_> =
-        profiles.iter().zip(parts).map(|(p, part)| (p, part.program.moves.as_slice())).collect();
-    let stages = report::stages(&done.ready.setup.stock, &done.ready.grid, &runs);
-    let steps: Vec<Step<'_>> = parts
-        .iter()
-        .zip(stages.windows(2))
-        .map(|(part, stage)| Step {
-            name: &part.name,
-            cutter: &part.cutter.name,
-            before: &stage[0],
-            after: &stage[1],
-        })
-        .collect();
-    report::steps_png(&steps, look, title)
 }
 
 /// Cross-sections along the lines asked for, else through the worst place, or the deepest one.
